@@ -1,0 +1,14 @@
+"""Tester agents: one protocol (``base``), one registry, one file an algorithm.
+
+Importing this package registers the agents that come with cavsumo.
+"""
+
+from cavsumo.agents import (  # noqa: F401  (imported to be registered)
+    election,
+    programmed,
+    qlearning,
+    random,
+)
+from cavsumo.agents.base import AGENTS, Agent, Scene
+
+__all__ = ["AGENTS", "Agent", "Scene"]

@@ -1,0 +1,97 @@
+"""What a tester agent is: it sees snapshots and chooses actions for the bodies it owns."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, ClassVar
+
+import numpy as np
+
+from cavsumo.bodies import NOOP, Action, Body
+from cavsumo.paths import Path
+from cavsumo.registry import Registry
+from cavsumo.roads import Roads, Start
+from cavsumo.snapshot import BodyState, Snapshot
+
+
+@dataclass(frozen=True)
+class Scene:
+    """What does not change during an episode.
+
+    Attributes:
+        dt: length of a timestep, the seed's lambda [s].
+        ego: the vehicle under test.
+        ego_path: where it means to drive.
+        bodies: the testers' bodies, in the order of ``Snapshot.testers``.
+        starts: where each of them starts.
+        roads: carriageways and the ways across them; None on an open plane.
+    """
+
+    dt: float
+    ego: Body
+    ego_path: Path
+    bodies: tuple[Body, ...]
+    starts: tuple[Start, ...]
+    roads: Roads | None = None
+
+
+class Agent:
+    """Base of the tester agents; on its own it does nothing at all.
+
+    An agent lives as long as a batch: ``reset`` begins an episode, what it learned stays.
+    """
+
+    PARAMETERS: ClassVar[Mapping[str, str]] = {}
+
+    scene: Scene
+    owned: tuple[int, ...]
+    rng: np.random.Generator
+
+    def reset(self, scene: Scene, owned: Sequence[int], rng: np.random.Generator) -> None:
+        """Begin an episode with the bodies ``scene.bodies[i] for i in owned``.
+
+        The generator belongs to this agent for this episode; nobody else draws from it.
+        """
+        self.scene, self.owned, self.rng = scene, tuple(owned), rng
+
+    def choose_action(self, snapshot: Snapshot) -> tuple[Action, ...]:
+        """An action for each owned body, in their order (seed, ChooseAction)."""
+        return tuple(NOOP for _ in self.owned)
+
+    def process_feedback(
+        self,
+        snapshot: Snapshot,
+        action: tuple[Action, ...],
+        reward: float,
+        successor: Snapshot,
+        terminal: bool,
+    ) -> None:
+        """Learn from one timestep (seed, ProcessFeedback); most agents learn nothing.
+
+        ``terminal``: the successor is a goal or a dead end, so nothing follows it. It is False
+        at the horizon, where only the simulation ends.
+        """
+
+    def recall(self) -> Any:
+        """What the agent learned so far, as plain data; None when it does not learn."""
+        return None
+
+    def remember(self, memory: Any) -> None:
+        """Take up what an earlier life of this agent learned."""
+
+    def own(self, snapshot: Snapshot) -> list[BodyState]:
+        """The states of the owned bodies."""
+        return [snapshot.testers[i] for i in self.owned]
+
+    @classmethod
+    def coordinate(cls, agents: Sequence[Agent], rng: np.random.Generator) -> None:
+        """Let the agents of one episode know of each other; called after their resets."""
+
+
+AGENTS: Registry[Agent] = Registry("agent")
+
+
+@AGENTS.register("noop")
+class NoopAgent(Agent):
+    """Does nothing: its bodies keep their speed and direction (the seed's noop)."""

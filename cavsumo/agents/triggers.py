@@ -1,0 +1,109 @@
+"""When a programmed behaviour starts: by distance to the ego, or timed to its arrival."""
+
+from __future__ import annotations
+
+import math
+from typing import Protocol
+
+from cavsumo.agents.base import Scene
+from cavsumo.bodies import Kind
+from cavsumo.geometry import stopping_distances
+from cavsumo.kinematics import wrap
+from cavsumo.snapshot import BodyState, Snapshot
+
+# The zones that the timing trigger aims at: CAV-Gym's, as in the reaction-zone assertion.
+MAX_DECEL, REACTION_TIME = 9.0, 0.675  # m/s2, s
+
+
+class Trigger(Protocol):
+    """The seed's trigger phi: whether a body's behaviour starts in this state."""
+
+    def __call__(self, snapshot: Snapshot, state: BodyState) -> bool: ...
+
+
+def ego_distance(snapshot: Snapshot, state: BodyState) -> float:
+    """Distance between the centres of the ego and a body [m]."""
+    return math.hypot(state.x - snapshot.ego.x, state.y - snapshot.ego.y)
+
+
+def distance_ahead(snapshot: Snapshot, state: BodyState) -> float:
+    """How far ahead of the ego a body is, negative behind it [m]."""
+    ego = snapshot.ego
+    return (state.x - ego.x) * math.cos(ego.o) + (state.y - ego.y) * math.sin(ego.o)
+
+
+class Proximity:
+    """Holds while the body is closer to the ego than a distance [m]."""
+
+    def __init__(self, distance_m: float) -> None:
+        self.distance_m = distance_m
+
+    def __call__(self, snapshot: Snapshot, state: BodyState) -> bool:
+        return ego_distance(snapshot, state) < self.distance_m
+
+
+class Timing:
+    """Holds when a body that goes now meets the ego's path as the ego's reaction zone covers it.
+
+    The ego is expected to keep its speed. The body enters the strip that the ego sweeps after
+    t_e seconds; the gap from the ego's front to the body is then
+    ``gap = distance - v_ego * t_e``, and the step is timed when d_b < gap <= d_b + aim * d_r,
+    with d_b and d_r the lengths of the braking and the reaction zone.
+
+    Args:
+        aim: how far into the reaction zone to wait, in (0, 1]: 1 steps in as its far end arrives,
+            small values as its near end does, for egos that brake before the zone is entered.
+    """
+
+    def __init__(self, scene: Scene, index: int, aim: float) -> None:
+        self.path, self.aim, self.dt = scene.ego_path, aim, scene.dt
+        self.ego_half = scene.ego.kind.length / 2
+        self.segment: int | None = None
+        start, kind = scene.starts[index], scene.bodies[index].kind
+        self.way = scene.roads.crossing(start.x, start.y) if scene.roads else None
+        meeting = self.path.meet(start.x, start.y, self.way.heading) if self.way else None
+        self.meeting = None if meeting is None else meeting[1]
+        # How far along its way the body's front touches the strip that the ego sweeps.
+        reach = meeting[0] if meeting else 0.0
+        self.strip = reach - scene.ego.kind.width / 2 - kind.length / 2
+
+    def __call__(self, snapshot: Snapshot, state: BodyState) -> bool:
+        gap = self.gap_at_entry(snapshot, state)
+        braking, reaction = stopping_distances(
+            snapshot.ego.v, max_decel=MAX_DECEL, reaction_time=REACTION_TIME
+        )
+        return gap is not None and braking < gap <= braking + self.aim * reaction
+
+    def gap_at_entry(self, snapshot: Snapshot, state: BodyState) -> float | None:
+        """Distance from the ego's front to the body as it enters the ego's strip [m]."""
+        if self.way is None or self.meeting is None:
+            return None
+        ego = snapshot.ego
+        here = self.path.project(ego.x, ego.y, self.segment)
+        self.segment = here.segment
+        front = here.along + self.ego_half
+        kind = state.body.kind
+        left = self.strip - self.way.progress(state.x, state.y)
+        entry = time_to_walk(kind, state.v, left + detour(kind, state.o, self.way.heading))
+        return self.meeting - kind.width / 2 - front - ego.v * (entry + self.dt)
+
+
+def time_to_walk(kind: Kind, v: float, distance: float) -> float:
+    """Time to cover a distance from speed v, accelerating to full speed at full throttle [s]."""
+    if distance <= 0.0:
+        return 0.0
+    a, top = kind.throttle_max, kind.v_max
+    gaining = (top * top - v * v) / (2.0 * a)
+    if gaining >= distance:
+        return (math.sqrt(v * v + 2.0 * a * distance) - v) / a
+    return (top - v) / a + (distance - gaining) / top
+
+
+def detour(kind: Kind, o: float, heading: float) -> float:
+    """How much longer the way gets by turning to a heading first, at full steering [m].
+
+    A body turning by phi on the radius R = b / (2 sin beta) walks R phi and gains R sin phi.
+    """
+    phi = abs(wrap(heading - o))
+    radius = kind.wheelbase / (2.0 * math.sin(math.atan(0.5 * math.tan(kind.steering_max))))
+    return radius * (phi - math.sin(phi))

@@ -1,0 +1,140 @@
+"""How a body walks: along its pavement, up to the kerb, across the road. Used by the agents.
+
+Every movement is an action of the body's two effectors; nothing here moves a body by itself.
+"""
+
+from __future__ import annotations
+
+import math
+
+from cavsumo.agents.base import Scene
+from cavsumo.bodies import Action, Kind
+from cavsumo.kinematics import steering_for_turn, wrap
+from cavsumo.roads import Crossing
+from cavsumo.snapshot import BodyState
+
+ALIGNED_RAD = 1e-6  # a heading this close to its target has reached it
+KERB_CLEARANCE_M = 0.1  # distance kept to the carriageway while waiting at the kerb
+PAVEMENT_GAIN = 0.5  # how strongly a walker returns to its line on the pavement [rad/m]
+
+
+def turn_limit(kind: Kind, v: float, dt: float) -> float:
+    """The largest turn that full steering makes in one timestep (seed, eq. 15) [rad]."""
+    return 2.0 * v * dt / kind.wheelbase * math.sin(math.atan(0.5 * math.tan(kind.steering_max)))
+
+
+def steer_to(state: BodyState, heading: float, dt: float) -> float:
+    """The steering angle that turns a body to a heading as fast as it can [rad]."""
+    turn = wrap(heading - state.o)
+    if abs(turn) < 1e-12 or state.v <= 0.0:
+        return 0.0
+    kind = state.body.kind
+    if abs(turn) >= turn_limit(kind, state.v, dt):
+        return math.copysign(kind.steering_max, turn)
+    return steering_for_turn(state.v, turn, kind.wheelbase, dt)
+
+
+def throttle_to(state: BodyState, speed: float, dt: float) -> float:
+    """The throttle that brings a body to a speed as fast as it can [m/s2]."""
+    kind = state.body.kind
+    return min(kind.throttle_max, max(kind.throttle_min, (speed - state.v) / dt))
+
+
+def walk(state: BodyState, heading: float, speed: float, dt: float) -> Action:
+    """Turn to a heading and take a speed."""
+    return Action(throttle_to(state, speed, dt), steer_to(state, heading, dt))
+
+
+def stopping_speed(kind: Kind, distance: float, dt: float) -> float:
+    """The largest speed from which a body still stops within a distance [m/s].
+
+    From v^2 / (2 b) + v dt <= distance: the position follows one timestep behind the throttle.
+    """
+    if distance <= 0.0:
+        return 0.0
+    b = -kind.throttle_min
+    return min(kind.v_max, math.sqrt((b * dt) ** 2 + 2.0 * b * distance) - b * dt)
+
+
+class CrossingWalk:
+    """The programmed behaviour of the seed's agents: across the road, then on as before.
+
+    Begins where the body stands, keeps to the straight line across, ends behind the far kerb by
+    turning back to the old orientation (CAV-Gym's CrossingAgent).
+    """
+
+    def __init__(self, scene: Scene) -> None:
+        self.scene = scene
+        self.crossing: Crossing | None = None
+        self.turning_back = False
+        self.prior = 0.0
+
+    @property
+    def active(self) -> bool:
+        """Whether the behaviour is under way."""
+        return self.crossing is not None
+
+    def begin(self, state: BodyState) -> bool:
+        """Start crossing from here; False where there is no road to cross."""
+        if self.scene.roads is None:
+            return False
+        self.crossing = self.scene.roads.crossing(state.x, state.y)
+        self.turning_back = False
+        self.prior = state.o
+        return self.active
+
+    def action(self, state: BodyState) -> Action:
+        """The next action while active; ends the behaviour when it has arrived."""
+        assert self.crossing is not None
+        if not self.turning_back and self.crossing.progress(state.x, state.y) >= (
+            self.crossing.length
+        ):
+            self.turning_back = True
+        heading = self.prior if self.turning_back else self.crossing.heading
+        action = walk(state, heading, state.body.kind.v_max, self.scene.dt)
+        if self.turning_back and abs(wrap(heading - state.o)) < ALIGNED_RAD:
+            self.crossing = None
+        return action
+
+
+class Stroll:
+    """Walk along the pavement one starts on, at full speed, and stop at its end."""
+
+    def __init__(self, scene: Scene, index: int) -> None:
+        self.dt, self.start = scene.dt, scene.starts[index]
+        self.segment: int | None = None
+
+    def action(self, state: BodyState) -> Action:
+        """The next action; straight on for a body that started away from any pavement."""
+        start, kind = self.start, state.body.kind
+        if start.pavement is None:
+            return walk(state, state.o, kind.v_max, self.dt)
+        here = start.pavement.project(state.x, state.y, self.segment)
+        self.segment = here.segment
+        _, _, axis = start.pavement.at(here.along)
+        left = here.along if not start.forwards else start.pavement.length - here.along
+        correction = max(-0.5, min(0.5, PAVEMENT_GAIN * (start.lateral - here.lateral)))
+        heading = axis + correction if start.forwards else axis + math.pi - correction
+        return walk(state, heading, stopping_speed(kind, left, self.dt), self.dt)
+
+
+class ApproachKerb:
+    """Go straight to the kerb and wait there, facing the road."""
+
+    def __init__(self, scene: Scene, index: int) -> None:
+        self.dt = scene.dt
+        start = scene.starts[index]
+        self.way = scene.roads.crossing(start.x, start.y) if scene.roads else None
+        kind = scene.bodies[index].kind
+        self.stop = (self.way.enter if self.way else 0.0) - kind.length / 2 - KERB_CLEARANCE_M
+
+    def action(self, state: BodyState) -> Action:
+        """The next action; a body too fast to stop at the kerb brakes before it turns there."""
+        kind = state.body.kind
+        if self.way is None:
+            return walk(state, state.o, 0.0, self.dt)
+        left = self.stop - self.way.progress(state.x, state.y)
+        allowed = stopping_speed(kind, left, self.dt)
+        too_fast = state.v > allowed - kind.throttle_min * self.dt + 1e-9
+        heading = state.o if too_fast else self.way.heading
+        return walk(state, heading, allowed, self.dt)

@@ -1,0 +1,9 @@
+"""What the ego must not do: one protocol (``base``), one registry, one file an assertion.
+
+Importing this package registers the assertions that come with cavsumo.
+"""
+
+from cavsumo.assertions import collision, reaction_zone  # noqa: F401  (imported to be registered)
+from cavsumo.assertions.base import ASSERTIONS, Assertion, Judgement
+
+__all__ = ["ASSERTIONS", "Assertion", "Judgement"]

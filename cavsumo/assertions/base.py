@@ -1,0 +1,80 @@
+"""An assertion has a precondition; its verdict is never just pass or fail."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import ClassVar
+
+from cavsumo.agents.base import Scene
+from cavsumo.contacts import Contact
+from cavsumo.registry import Registry
+from cavsumo.snapshot import Snapshot
+
+# Verdicts, the most serious first: how several assertions make one outcome.
+VIOLATED, UNFAIR, HELD, NOT_TRIGGERED = "violated", "unfair", "held", "not_triggered"
+SEVERITY = (VIOLATED, UNFAIR, HELD, NOT_TRIGGERED)
+
+# Below this speed the ego stands: whoever touches it then walked into it [m/s].
+STANDING_MPS = 0.1
+
+
+@dataclass(frozen=True, slots=True)
+class Judgement:
+    """What an assertion says of an episode.
+
+    Attributes:
+        assertion: its name.
+        verdict: ``not_triggered``: the precondition never held; ``held``: it did and the ego
+            coped; ``violated``: it did and the ego broke the assertion; ``unfair``: the tester
+            left the ego no chance.
+        tester: id of the body involved, if any.
+        trigger_time, violation_time: when the precondition began to hold, when the assertion was
+            broken [s].
+        ego_speed: speed of the ego at the violation, else at the trigger [m/s].
+        impact_speed: closing speed of a contact [m/s].
+    """
+
+    assertion: str
+    verdict: str = NOT_TRIGGERED
+    tester: str = ""
+    trigger_time: float | None = None
+    violation_time: float | None = None
+    ego_speed: float | None = None
+    impact_speed: float | None = None
+
+    @property
+    def triggered(self) -> bool:
+        """Whether the episode was a test in the seed's sense."""
+        return self.verdict in (HELD, VIOLATED)
+
+
+class Assertion:
+    """Base of the assertions: watches an episode snapshot by snapshot.
+
+    Attributes:
+        name: as registered.
+        judgement: what it says so far.
+        decided: nothing that follows can change the judgement.
+        pending: the precondition held and the verdict is still open, so the episode goes on.
+    """
+
+    PARAMETERS: ClassVar[Mapping[str, str]] = {}
+    name: ClassVar[str]
+
+    judgement: Judgement
+    decided: bool
+    pending: bool
+
+    def reset(self, scene: Scene) -> None:
+        """Begin an episode."""
+        self.scene = scene
+        self.judgement = Judgement(self.name)
+        self.decided = self.pending = False
+
+    def observe(self, snapshot: Snapshot, contacts: Sequence[Contact]) -> None:
+        """Take in a snapshot and the contacts that begin in it."""
+        raise NotImplementedError
+
+
+ASSERTIONS: Registry[Assertion] = Registry("assertion")

@@ -1,0 +1,138 @@
+"""The seed's key assertion: the ego hits no body that it could have avoided.
+
+Source: CAV-Gym (stopping zones, "interesting" tests); the seed, Definition 2, where the goal of
+the tester is the precondition of an assertion.
+
+The precondition is that a tester's body enters the ego's reaction zone before it touches the
+braking zone or the ego: late enough to be hard, early enough for a vehicle that brakes at once.
+A body that touches the braking zone or the ego first makes the episode unfair.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from collections.abc import Mapping, Sequence
+from typing import ClassVar
+
+from cavsumo.agents.base import Scene
+from cavsumo.assertions.base import (
+    ASSERTIONS,
+    HELD,
+    STANDING_MPS,
+    UNFAIR,
+    VIOLATED,
+    Assertion,
+    Judgement,
+)
+from cavsumo.checks import number
+from cavsumo.contacts import Contact
+from cavsumo.geometry import in_frame, zone_entered
+from cavsumo.snapshot import BodyState, Snapshot
+
+
+@ASSERTIONS.register("reaction-zone")
+class ReactionZoneAssertion(Assertion):
+    """The ego hits no body it could have avoided (CAV-Gym's key assertion, the default).
+
+    Decided by contact, by the ego having passed the body, or by its standing clear of it.
+    """
+
+    name: ClassVar[str] = "reaction-zone"
+    PARAMETERS: ClassVar[Mapping[str, str]] = {
+        "max_decel": "the deceleration that the zones assume [m/s2]",
+        "reaction_time": "the reaction time that the zones assume [s]",
+        "clear_s": "how long the ego must stand clear for the verdict held [s]",
+    }
+
+    def __init__(
+        self, max_decel: float = 9.0, reaction_time: float = 0.675, clear_s: float = 1.0
+    ) -> None:
+        self.max_decel = number("max_decel", max_decel, 0.1, 100.0)
+        self.reaction_time = number("reaction_time", reaction_time, 0.0, 10.0)
+        self.clear_s = number("clear_s", clear_s, 0.0, 60.0)
+
+    def reset(self, scene: Scene) -> None:
+        super().reset(scene)
+        self._body: int | None = None
+        self._standing_since: float | None = None
+
+    def observe(self, snapshot: Snapshot, contacts: Sequence[Contact]) -> None:
+        if self.decided:
+            return
+        if self._body is None:
+            self._watch_zones(snapshot)
+        else:
+            self._watch_contact(snapshot, contacts, snapshot.testers[self._body])
+
+    def _watch_zones(self, snapshot: Snapshot) -> None:
+        """Look for the first zone that any body enters; at the same timestep unfair wins."""
+        ego = snapshot.ego
+        if ego.v <= STANDING_MPS:
+            return
+        entered = [
+            (zone_entered(
+                tester.box,
+                ego.box,
+                ego.v,
+                max_decel=self.max_decel,
+                reaction_time=self.reaction_time,
+                steering=snapshot.ego_steering,
+                wheelbase=ego.body.kind.wheelbase,
+            ), i)
+            for i, tester in enumerate(snapshot.testers)
+        ]
+        early = [i for zone, i in entered if zone in ("body", "braking")]
+        fair = [i for zone, i in entered if zone == "reaction"]
+        if early:
+            self._enter(snapshot, early[0], UNFAIR)
+            self.decided = True
+        elif fair:
+            self._enter(snapshot, fair[0], HELD)
+            self.pending, self._body = True, fair[0]
+
+    def _enter(self, snapshot: Snapshot, body: int, verdict: str) -> None:
+        """Record who entered a zone, and when."""
+        self.judgement = Judgement(
+            self.name,
+            verdict,
+            snapshot.testers[body].id,
+            trigger_time=snapshot.time if verdict == HELD else None,
+            ego_speed=snapshot.ego.v,
+        )
+
+    def _watch_contact(
+        self, snapshot: Snapshot, contacts: Sequence[Contact], body: BodyState
+    ) -> None:
+        """Wait for the contact, or until the ego has passed or stands clear."""
+        ego = snapshot.ego
+        hit = next((c for c in contacts if c.a is ego and c.b.id == body.id), None)
+        if hit is not None and ego.v > STANDING_MPS:
+            self.judgement = dataclasses.replace(
+                self.judgement,
+                verdict=VIOLATED,
+                violation_time=snapshot.time,
+                ego_speed=ego.v,
+                impact_speed=hit.closing_speed,
+            )
+            self._decide()
+        elif self._passed(ego, body) or self._stands_clear(snapshot):
+            self._decide()
+
+    def _decide(self) -> None:
+        self.decided, self.pending = True, False
+
+    def _passed(self, ego: BodyState, body: BodyState) -> bool:
+        """Whether the whole body lies behind the ego's rear bumper."""
+        seen = in_frame(body.box, ego.x, ego.y, ego.o)
+        extent = math.hypot(seen.length, seen.width) / 2
+        return seen.x + extent < -ego.body.kind.length / 2
+
+    def _stands_clear(self, snapshot: Snapshot) -> bool:
+        """Whether the ego has been standing for long enough."""
+        if snapshot.ego.v > STANDING_MPS:
+            self._standing_since = None
+            return False
+        if self._standing_since is None:
+            self._standing_since = snapshot.time
+        return snapshot.time - self._standing_since >= self.clear_s - 1e-9

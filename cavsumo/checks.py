@@ -1,0 +1,29 @@
+"""Checks of single numbers, with one sentence when they fail."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+
+def number(name: str, value: Any, low: float = -math.inf, high: float = math.inf) -> float:
+    """A finite number within [low, high], or ValueError naming what was expected."""
+    if isinstance(value, bool) or not isinstance(value, (int, float)) or not math.isfinite(value):
+        raise ValueError(f"{name} must be a finite number, got {value!r}")
+    if not low <= value <= high:
+        raise ValueError(f"{name} must lie in [{low:g}, {high:g}], got {value!r}")
+    return float(value)
+
+
+def whole(name: str, value: Any, low: int = 0) -> int:
+    """A whole number of at least ``low``, or ValueError naming what was expected."""
+    if isinstance(value, bool) or not isinstance(value, int) or value < low:
+        raise ValueError(f"{name} must be a whole number of at least {low}, got {value!r}")
+    return value
+
+
+def choice(name: str, value: Any, valid: tuple[str, ...]) -> str:
+    """One of the valid words, or ValueError listing them."""
+    if value not in valid:
+        raise ValueError(f"{name} must be one of {', '.join(valid)}, got {value!r}")
+    return str(value)

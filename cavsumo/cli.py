@@ -1,0 +1,190 @@
+"""Words into calls; the heavy parts are imported inside the commands."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any, NoReturn
+
+from cavsumo import __version__
+from cavsumo.errors import CavsumoError, InputError
+
+OK, VIOLATIONS, USAGE, NOT_RUN, INTERRUPTED = 0, 1, 2, 3, 130
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """The command ``cavsumo``; returns the exit status."""
+    try:
+        options = _parser().parse_args(argv)
+        status: int = options.command(options)
+        return status
+    except CavsumoError as error:
+        print(f"cavsumo: {error}", file=sys.stderr)
+        return USAGE
+    except BrokenPipeError:
+        return OK
+    except KeyboardInterrupt:
+        return INTERRUPTED
+
+
+class _Parser(argparse.ArgumentParser):
+    """argparse with our way of saying no: one sentence, exit status 2."""
+
+    def error(self, message: str) -> NoReturn:
+        raise InputError(f"{message} (see {self.prog} --help)")
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = _Parser(
+        prog="cavsumo",
+        description="Which tests make this vehicle fail at this junction, are they fair, and how "
+        "sure are we? Generates tests for autonomous vehicles in SUMO.",
+        allow_abbrev=False,
+    )
+    parser.add_argument("--version", action="version", version=f"cavsumo {__version__}")
+    commands = parser.add_subparsers(title="commands", required=True, metavar="COMMAND")
+    _add_run(commands)
+    _add_replay(commands)
+    for sort, text in (
+        ("agents", "list the tester agents"),
+        ("egos", "list the vehicles under test"),
+        ("assertions", "list what can be asserted"),
+    ):
+        listing = commands.add_parser(sort, help=text, description=text, allow_abbrev=False)
+        listing.add_argument("name", nargs="?", help="show the parameters of this one")
+        listing.set_defaults(command=_list, sort=sort)
+    return parser
+
+
+def _add_run(commands: Any) -> None:
+    run = commands.add_parser(
+        "run",
+        help="run a batch of episodes and report the outcomes",
+        description="Run a batch of episodes and report the outcomes. Every option but --net has "
+        "a default; a TOML file given with -c may hold the same keys, the command line wins.",
+        allow_abbrev=False,
+    )
+    _add_scenario(run.add_argument_group("scenario"))
+    _add_testers(run.add_argument_group("testers"))
+    batch = run.add_argument_group("batch")
+    batch.add_argument("--runs", type=int, metavar="N", help="episodes an agent (default 100)")
+    batch.add_argument("--seed", type=int, help="seed of the batch (default 1)")
+    batch.add_argument("-e", "--end", type=float, metavar="S", help="horizon [s] (default 60)")
+    batch.add_argument("--step-length", type=float, metavar="S", help="timestep [s] (default 0.1)")
+    batch.add_argument(
+        "--deadline", type=float, metavar="S", help="real time an episode may take (default 120)"
+    )
+    output = run.add_argument_group("output")
+    output.add_argument(
+        "-o", "--output", default="results.csv", metavar="FILE", help="default results.csv"
+    )
+    output.add_argument(
+        "--trace", choices=("none", "tests", "all"), help="frames to keep (default tests)"
+    )
+    output.add_argument("--exit-zero", action="store_true", help="a violation is no failure")
+    output.add_argument("-q", "--quiet", action="store_true", help="no progress, no summary")
+    run.set_defaults(command=_run)
+
+
+def _add_scenario(group: Any) -> None:
+    add = group.add_argument
+    add("-n", "--net", "--net-file", metavar="FILE", help="SUMO network (.net.xml, .net.xml.gz)")
+    add(
+        "-r",
+        "--routes",
+        "--route-files",
+        metavar="FILE",
+        help="background demand, or none (default: routes/NAME.rou.xml when it exists)",
+    )
+    add("-a", "--additional-files", metavar="FILES", help="SUMO additional files, with commas")
+    add("-c", "--config", metavar="FILE", help="scenario file (TOML)")
+    add("--ego", metavar="NAME", help="an ego by name (see cavsumo egos) or module:Class")
+    add("--ego-param", action="append", metavar="KEY=VALUE", help="a parameter of the ego")
+    add("--ego-route", metavar="EDGES", help="edges of the ego's route, with commas or spaces")
+    add("--junction", metavar="ID", help="junction under test (default: the best one)")
+    add("--assert", dest="assertions", action="append", metavar="NAME", help="repeat for several")
+    add("--assert-param", action="append", metavar="KEY=VALUE", help="a parameter of theirs")
+
+
+def _add_testers(group: Any) -> None:
+    add = group.add_argument
+    add("--agent", dest="agents", action="append", metavar="NAME", help="repeat to compare")
+    add("--testers", type=int, metavar="N", help="number of tester bodies (default 3)")
+    add("--param", action="append", metavar="KEY=VALUE", help="parameter of the agents that "
+        "have it; AGENT.KEY=VALUE for one of them")
+    add("--kind", help="kind of body (default pedestrian)")
+    add("--bodies-per-agent", type=int, metavar="N", help="default 1")
+    add("--embodiment", choices=("vehicle", "person"), help="what SUMO is shown")
+    add("--sumo-width", type=float, metavar="M", help="width SUMO is shown (default 0.05)")
+    add("--start-speed", type=float, metavar="V", help="speed at the start (default: maximum)")
+
+
+def _add_replay(commands: Any) -> None:
+    replay = commands.add_parser(
+        "replay",
+        help="run one recorded episode again and check, step by step, that it is the same",
+        description="Run one recorded episode again and check, step by step, that it is the same.",
+        allow_abbrev=False,
+    )
+    replay.add_argument("results", type=Path, help="the CSV of a batch")
+    replay.add_argument("run", type=int, help="number of the episode")
+    replay.set_defaults(command=_replay)
+
+
+def _run(options: argparse.Namespace) -> int:
+    from cavsumo.commands import run
+
+    return run(_settings(options), Path(options.output), options.quiet, options.exit_zero)
+
+
+def _replay(options: argparse.Namespace) -> int:
+    from cavsumo.commands import replay
+
+    return replay(options.results, options.run)
+
+
+def _list(options: argparse.Namespace) -> int:
+    from cavsumo.listings import listing
+
+    print(listing(options.sort, options.name))
+    return OK
+
+
+def _settings(options: argparse.Namespace) -> dict[str, Any]:
+    """The settings of a run: the file's, overruled by the command line's."""
+    from cavsumo.scenario import read_config
+
+    settings = read_config(Path(options.config)) if options.config else {}
+    plain = ("net", "routes", "ego", "junction", "agents", "runs", "seed", "end", "step_length")
+    plain += ("testers", "kind", "bodies_per_agent", "embodiment", "sumo_width", "start_speed")
+    plain += ("trace", "assertions")
+    given = {key: getattr(options, key) for key in plain}
+    given["deadline_s"] = options.deadline
+    given["ego_route"] = options.ego_route and options.ego_route.replace(",", " ").split()
+    given["additional"] = options.additional_files and options.additional_files.split(",")
+    settings |= {key: value for key, value in given.items() if value is not None}
+    for key, words in (
+        ("params", options.param),
+        ("ego_params", options.ego_param),
+        ("assertion_params", options.assert_param),
+    ):
+        if words:
+            settings[key] = settings.get(key, {}) | dict(_assignment(key, w) for w in words)
+    return settings
+
+
+def _assignment(option: str, word: str) -> tuple[str, bool | int | float | str]:
+    """KEY=VALUE as a key and a truth value, a number or a word."""
+    key, equals, value = word.partition("=")
+    if not (key and equals):
+        raise InputError(f"{option}: expected KEY=VALUE, got {word!r}")
+    if value in ("true", "false"):
+        return key, value == "true"
+    for number in (int, float):
+        try:
+            return key, number(value)
+        except ValueError:
+            continue
+    return key, value

@@ -1,0 +1,59 @@
+"""What an ego is: driven by SUMO, or a controller that answers each snapshot with a command."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Mapping
+from typing import ClassVar, NamedTuple
+
+from cavsumo.agents.base import Scene
+from cavsumo.bodies import CAR, Kind
+from cavsumo.registry import Registry
+from cavsumo.snapshot import Snapshot
+
+# CAV-Gym's car on roads that allow more than its 9 m/s.
+EGO_KIND = dataclasses.replace(CAR, v_max=55.0)
+
+
+class Acceleration(NamedTuple):
+    """Keep to the route and change speed; SUMO steers."""
+
+    value: float  # m/s2
+
+
+class Drive(NamedTuple):
+    """Drive freely by the kinematics of the seed, like a tester's body."""
+
+    throttle: float  # m/s2
+    steering: float  # rad, positive to the left
+
+
+Command = Acceleration | Drive | None
+
+
+class Ego:
+    """Base of the egos; on its own it leaves the driving to SUMO.
+
+    Attributes:
+        kind: its box and limits.
+        depart_speed: speed on entering the network [m/s]; None for as fast as SUMO finds safe.
+    """
+
+    PARAMETERS: ClassVar[Mapping[str, str]] = {}
+
+    kind: Kind = EGO_KIND
+    depart_speed: float | None = None
+
+    def vtype(self) -> dict[str, str]:
+        """The attributes of its SUMO vehicle type."""
+        return {"length": f"{self.kind.length}", "width": f"{self.kind.width}"}
+
+    def reset(self, scene: Scene) -> None:
+        """Begin an episode."""
+
+    def act(self, snapshot: Snapshot) -> Command:
+        """The command for the next timestep; None lets SUMO drive, in every timestep."""
+        return None
+
+
+EGOS: Registry[Ego] = Registry("ego")

@@ -1,0 +1,30 @@
+"""An ego that keeps its speed whatever happens, as in CAV-Gym's experiments."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import ClassVar
+
+from cavsumo.agents.base import Scene
+from cavsumo.checks import number
+from cavsumo.egos.base import EGOS, Acceleration, Command, Ego
+from cavsumo.snapshot import Snapshot
+
+
+@EGOS.register("constant")
+class ConstantEgo(Ego):
+    """Keeps its speed and its route and brakes for nobody (CAV-Gym's ego)."""
+
+    PARAMETERS: ClassVar[Mapping[str, str]] = {"speed": "the speed it keeps [m/s]"}
+
+    def __init__(self, speed: float = 6.75) -> None:
+        self.speed = number("speed", speed, 0.0, self.kind.v_max)
+        self.depart_speed = self.speed
+
+    def reset(self, scene: Scene) -> None:
+        self.dt = scene.dt
+
+    def act(self, snapshot: Snapshot) -> Command:
+        # SUMO may still correct the speed on insertion; full throttle or brake brings it back.
+        wanted = (self.speed - snapshot.ego.v) / self.dt
+        return Acceleration(min(self.kind.throttle_max, max(self.kind.throttle_min, wanted)))

@@ -1,0 +1,109 @@
+"""Egos from the user: a Python class named ``module:Class``, kept from doing harm.
+
+The class is built with the ego's parameters as keywords. It has ``act(snapshot)``, which answers
+``Acceleration`` or ``Drive``, and may have ``reset(scene)``, ``kind`` and ``depart_speed``.
+"""
+
+from __future__ import annotations
+
+import importlib
+import math
+import sys
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Any
+
+from cavsumo.agents.base import Scene
+from cavsumo.bodies import Kind
+from cavsumo.egos.base import EGO_KIND, EGOS, Acceleration, Command, Drive, Ego
+from cavsumo.errors import EgoError, InputError, UnknownName
+from cavsumo.snapshot import Snapshot
+
+
+def make_ego(spec: str, params: Mapping[str, Any]) -> Ego:
+    """The registered ego of that name, or the controller class ``module:Class``."""
+    if ":" not in spec:
+        return EGOS.make(spec, params)
+    return ControllerEgo(spec, _controller_class(spec), params)
+
+
+class ControllerEgo(Ego):
+    """Wraps a user's controller: whatever it does wrong becomes an EgoError with the time."""
+
+    def __init__(self, spec: str, factory: Callable[..., Any], params: Mapping[str, Any]) -> None:
+        self.spec = spec
+        try:
+            self.controller = factory(**params)
+        except Exception as error:
+            raise InputError(f"ego {spec}: cannot be built: {_said(error)}") from error
+        if not callable(getattr(self.controller, "act", None)):
+            raise InputError(f"ego {spec}: has no method act(snapshot)")
+        self.kind = getattr(self.controller, "kind", EGO_KIND)
+        if not isinstance(self.kind, Kind):
+            raise InputError(f"ego {spec}: kind must be a cavsumo.bodies.Kind, got {self.kind!r}")
+        speed = getattr(self.controller, "depart_speed", None)
+        if speed is not None and not _within(speed, 0.0, self.kind.v_max):
+            raise InputError(f"ego {spec}: depart_speed must lie in [0, {self.kind.v_max:g}] m/s")
+        self.depart_speed = speed
+
+    def reset(self, scene: Scene) -> None:
+        self._sort: type | None = None
+        try:
+            if hasattr(self.controller, "reset"):
+                self.controller.reset(scene)
+        except Exception as error:
+            raise EgoError(f"ego {self.spec}: reset raised {_said(error)}") from error
+
+    def act(self, snapshot: Snapshot) -> Command:
+        at = f"ego {self.spec} at {snapshot.time:.2f} s"
+        try:
+            command = self.controller.act(snapshot)
+        except Exception as error:
+            raise EgoError(f"{at}: act raised {_said(error)}") from error
+        return self._checked(command, at)
+
+    def _checked(self, command: Any, at: str) -> Command:
+        """The command, if it is one that the ego's effectors can execute."""
+        if not isinstance(command, (Acceleration, Drive)):
+            raise EgoError(f"{at}: answered {command!r}, expected Acceleration or Drive")
+        if self._sort not in (None, type(command)):
+            raise EgoError(f"{at}: changed from {self._sort.__name__} to {command!r}")
+        self._sort = type(command)
+        kind = self.kind
+        limits = [(kind.throttle_min, kind.throttle_max), (-kind.steering_max, kind.steering_max)]
+        for name, value, (low, high) in zip(command._fields, command, limits, strict=False):
+            if not _within(value, low, high):
+                raise EgoError(f"{at}: {name} must lie in [{low:g}, {high:g}], got {value!r}")
+        return command
+
+
+def _controller_class(spec: str) -> Callable[..., Any]:
+    """Import ``module:Class``, the working directory included."""
+    module_name, _, class_name = spec.partition(":")
+    here = str(Path.cwd())
+    if here not in sys.path:
+        sys.path.insert(0, here)
+    try:
+        module = importlib.import_module(module_name)
+    except ModuleNotFoundError as error:
+        raise InputError(f"ego {spec}: no module named {error.name!r}") from error
+    except Exception as error:
+        raise InputError(f"ego {spec}: importing {module_name} raised {_said(error)}") from error
+    if not callable(getattr(module, class_name, None)):
+        names = [n for n, v in vars(module).items() if isinstance(v, type)]
+        raise UnknownName(f"class in module {module_name}", class_name, names, f"ego {spec}")
+    factory: Callable[..., Any] = getattr(module, class_name)
+    return factory
+
+
+def _within(value: Any, low: float, high: float) -> bool:
+    """Whether a value is a finite number between two bounds, rounding forgiven."""
+    try:
+        return math.isfinite(value) and low - 1e-9 <= value <= high + 1e-9
+    except TypeError:
+        return False
+
+
+def _said(error: BaseException) -> str:
+    """An exception as one line."""
+    return " ".join(f"{type(error).__name__}: {error}".split())

@@ -1,0 +1,70 @@
+"""Everything that can go wrong, as one short tree.
+
+::
+
+    CavsumoError                what a user sees as one sentence, never as a traceback
+    |-- InputError              the command line or an input file is wrong (exit status 2)
+    |   |-- UnknownName         a name that no registry, network or file has
+    |   `-- NetworkError        a network that cannot serve the test asked for
+    |-- NoSuchAction            no action leads from one state to another (seed, eq. 22)
+    |-- EgoError                the ego's controller raised or gave an answer that is none
+    |-- AgentError              a tester agent raised or chose an action outside its space
+    |-- SimulationError         SUMO refused a call, or the ego never entered the network
+    `-- ResultsError            results on disk are missing, foreign or damaged (exit status 2)
+"""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Iterable
+
+
+class CavsumoError(Exception):
+    """Base of every error that cavsumo raises on purpose; its message says what to do."""
+
+
+class InputError(CavsumoError):
+    """The command line or an input file is wrong."""
+
+
+class UnknownName(InputError):
+    """A name that is not among the valid ones; the message suggests the nearest."""
+
+    def __init__(self, what: str, name: str, valid: Iterable[str], where: str = "") -> None:
+        self.name, self.valid = name, sorted(valid)
+        place = f"{where}: " if where else ""
+        super().__init__(f"{place}unknown {what} {name!r}{_hint(name, self.valid)}")
+
+
+class NetworkError(InputError):
+    """A network that cannot serve the test asked for."""
+
+
+class NoSuchAction(CavsumoError, ValueError):
+    """No action leads from the one state to the other."""
+
+
+class EgoError(CavsumoError):
+    """The ego's controller raised, or gave an answer that is none."""
+
+
+class AgentError(CavsumoError):
+    """A tester agent raised, or chose an action outside its space."""
+
+
+class SimulationError(CavsumoError):
+    """SUMO refused a call, or the ego never entered the network."""
+
+
+class ResultsError(InputError):
+    """Results on disk are missing, foreign or damaged."""
+
+
+def _hint(name: str, valid: list[str]) -> str:
+    """The nearest valid name, or all of them when there are few."""
+    near = difflib.get_close_matches(name, valid, n=1, cutoff=0.5)
+    if near:
+        return f"; did you mean {near[0]!r}?"
+    if valid and len(valid) <= 12:
+        return "; valid: " + ", ".join(valid)
+    return ""

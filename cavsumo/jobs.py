@@ -1,0 +1,102 @@
+"""One episode as a job: which it is, whose bodies play, and its row when it fails.
+
+Imported by the parent process, so nothing here touches SUMO.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from cavsumo.agents import AGENTS, Agent
+from cavsumo.bodies import Body, kind_named, model_of
+from cavsumo.errors import UnknownName
+from cavsumo.outcomes import Outcome, Row
+from cavsumo.scenario import BatchPlan, Scenario
+
+
+@dataclass(frozen=True)
+class Job:
+    """One episode to play.
+
+    Attributes:
+        run: its number in the batch.
+        agent: the tester agent's name.
+        seed: the episode's seed.
+        memory: what the agents learned in earlier episodes, one entry an agent; None for none.
+        record: keep the frames whatever happens.
+    """
+
+    run: int
+    agent: str
+    seed: int
+    memory: tuple[Any, ...] | None = None
+    record: bool = False
+
+
+def episode_seed(batch_seed: int, episode: int) -> int:
+    """The seed of an episode: the same for every agent, so that agents meet the same starts."""
+    words = np.random.SeedSequence((batch_seed, episode)).generate_state(1, np.uint32)
+    return int(words[0])
+
+
+def job(plan: BatchPlan, run: int, memory: tuple[Any, ...] | None = None) -> Job:
+    """The run-th episode of a batch: agents take turns, so run i stays what it is for any N."""
+    episode, which = divmod(run, len(plan.agents))
+    seed = episode_seed(plan.seed, episode)
+    return Job(run, plan.agents[which], seed, memory, plan.trace == "all")
+
+
+def make_agents(plan: BatchPlan, name: str) -> list[Agent]:
+    """The agents of one name, one for each team."""
+    known = {name: [p.name for p in AGENTS.parameters(name)]}
+    params = plan.agent_params(name, known)
+    return [AGENTS.make(name, params) for _ in teams(plan.scenario)]
+
+
+def teams(scenario: Scenario) -> tuple[tuple[int, ...], ...]:
+    """For each agent the indices of the bodies that it owns."""
+    size = scenario.bodies_per_agent
+    return tuple(tuple(range(i, i + size)) for i in range(0, scenario.testers, size))
+
+
+def tester_bodies(scenario: Scenario) -> tuple[Body, ...]:
+    """The testers' bodies, as an agent-body-effector model that was validated (Definition 1)."""
+    kind = kind_named(scenario.kind)
+    bodies = tuple(Body(f"tester{i}", kind) for i in range(scenario.testers))
+    model_of({f"agent{a}": [bodies[i] for i in team] for a, team in enumerate(teams(scenario))})
+    return bodies
+
+
+def failed(plan: BatchPlan, job: Job, message: str, wall: float) -> Outcome:
+    """The outcome of an episode that could not be played."""
+    return Outcome(head(plan, job) | {"outcome": "error", "error": message, "wall_s": wall}, [])
+
+
+def head(plan: BatchPlan, job: Job) -> Row:
+    """The columns that are known beforehand."""
+    scenario = plan.scenario
+    return {
+        "run": job.run,
+        "agent": job.agent,
+        "ego": scenario.ego,
+        "testers": scenario.testers,
+        "embodiment": scenario.embodiment,
+        "sumo_width_m": scenario.sumo_width,
+        "seed": job.seed,
+    }
+
+
+def check_agents(plan: BatchPlan) -> None:
+    """Build every agent once and account for every parameter, before anything starts."""
+    known = {name: [p.name for p in AGENTS.parameters(name)] for name in plan.agents}
+    shared = {key for keys in known.values() for key in keys}
+    qualified = {f"{name}.{key}" for name, keys in known.items() for key in keys}
+    for key in plan.params:
+        valid = qualified if "." in key else shared
+        if key not in valid:
+            raise UnknownName("parameter", key, valid, f"agent {' '.join(plan.agents)}")
+    for name in plan.agents:
+        make_agents(plan, name)

@@ -1,0 +1,185 @@
+"""What a SUMO network offers a test: lanes, pavements, crossings, carriageway.
+
+Read with sumolib; ids are opaque and never parsed, lane 0 is not assumed to be for driving, and
+no side of the road is taken for granted.
+"""
+
+from __future__ import annotations
+
+import gzip
+import xml.sax
+from collections.abc import Iterator, Sequence
+from pathlib import Path as FilePath
+from typing import Any
+from xml.etree import ElementTree
+
+import shapely
+import sumolib
+from shapely.geometry import LineString
+
+from cavsumo.errors import NetworkError, UnknownName
+from cavsumo.paths import Path, Point
+from cavsumo.roads import Roads
+
+# Junction interiors leave slivers between the lanes that cross them; closing by this much [m]
+# makes the carriageway one surface without reaching over a kerb.
+CLOSING_M = 0.5
+
+
+class Network:
+    """A network file, read once.
+
+    Attributes:
+        file: where it came from.
+        net: the sumolib network.
+        edges: its normal edges, in the order of their ids.
+    """
+
+    def __init__(self, file: FilePath, net: Any) -> None:
+        self.file = file
+        self.net = net
+        self.edges: list[Any] = sorted(
+            (e for e in net.getEdges() if e.getFunction() in ("", "connector")),
+            key=lambda e: str(e.getID()),
+        )
+
+    def edge(self, edge_id: str) -> Any:
+        """The edge of that id; raises UnknownName with the nearest one."""
+        if not self.net.hasEdge(edge_id):
+            raise UnknownName("edge", edge_id, (e.getID() for e in self.edges), str(self.file))
+        return self.net.getEdge(edge_id)
+
+    def junction(self, junction_id: str) -> Any:
+        """The junction of that id; raises UnknownName with the nearest one."""
+        nodes = {n.getID(): n for n in self.net.getNodes() if n.getType() != "internal"}
+        if junction_id not in nodes:
+            raise UnknownName("junction", junction_id, nodes, str(self.file))
+        return nodes[junction_id]
+
+    def crossed_edges(self) -> set[str]:
+        """Ids of the edges that a pedestrian crossing leads over."""
+        return {
+            str(crossed.getID())
+            for edge in self.net.getEdges(withInternal=True)
+            if edge.getFunction() == "crossing"
+            for crossed in edge.getCrossingEdges()
+        }
+
+    def crossing_surface(self) -> shapely.Geometry:
+        """The surface of the marked pedestrian crossings."""
+        return shapely.union_all(
+            [
+                _lane_area(lane)
+                for edge in self.net.getEdges(withInternal=True)
+                if edge.getFunction() == "crossing"
+                for lane in edge.getLanes()
+            ]
+        )
+
+    def pavements(self) -> Iterator[Any]:
+        """The lanes for pedestrians only, along the edges, in the order of their ids."""
+        for edge in self.edges:
+            yield from (lane for lane in edge.getLanes() if is_pavement(lane))
+
+    def roads(self) -> Roads:
+        """The carriageways, junctions included, and the axes of the driving lanes."""
+        driving = [lane for edge in self.edges for lane in driving_lanes(edge)]
+        inside = [
+            lane
+            for edge in self.net.getEdges(withInternal=True)
+            if edge.getFunction() == "internal"
+            for lane in driving_lanes(edge)
+        ]
+        surface = shapely.union_all([_lane_area(lane) for lane in driving + inside])
+        closed = surface.buffer(CLOSING_M, join_style="mitre").buffer(
+            -CLOSING_M, join_style="mitre"
+        )
+        return Roads(closed.simplify(0.01), [LineString(lane_shape(lane)) for lane in driving])
+
+
+def read_network(file: FilePath) -> Network:
+    """Read a .net.xml or .net.xml.gz; raises NetworkError in one sentence when it is none."""
+    if not file.is_file():
+        raise NetworkError(f"network {str(file)!r}: no such file{_neighbours(file)}")
+    _check_root(file)
+    try:
+        net = sumolib.net.readNet(str(file), withInternal=True, withPedestrianConnections=True)
+    except (xml.sax.SAXException, KeyError, ValueError, TypeError, AttributeError, OSError) as e:
+        raise NetworkError(f"network {str(file)!r}: cannot be read: {_one_line(e)}") from e
+    network = Network(file, net)
+    if not any(driving_lanes(edge) for edge in network.edges):
+        raise NetworkError(f"network {str(file)!r}: holds no lane on which a car may drive")
+    return network
+
+
+def driving_lanes(edge: Any) -> list[Any]:
+    """The lanes of an edge on which a passenger car may drive, rightmost first."""
+    return [lane for lane in edge.getLanes() if lane.allows("passenger")]
+
+
+def is_pavement(lane: Any) -> bool:
+    """Whether a lane is for pedestrians and not for cars."""
+    return bool(lane.allows("pedestrian") and not lane.allows("passenger"))
+
+
+def pavement_walk(edge: Any) -> tuple[str, ...]:
+    """Ids of an edge and of another one with a pavement that begins at its end, if any.
+
+    A person whose walk leads on through a junction survives ``moveToXY`` there; one whose walk
+    ends with its edge crashes SUMO.
+    """
+    back = {e.getID() for e in edge.getToNode().getOutgoing() if e.getToNode() is edge.getFromNode()}
+    onward = sorted(
+        (e.getID() in back, str(e.getID()))
+        for e in edge.getToNode().getOutgoing()
+        if any(is_pavement(lane) for lane in e.getLanes())
+    )
+    return (str(edge.getID()), *(edge_id for _, edge_id in onward[:1]))
+
+
+def lane_shape(lane: Any) -> list[Point]:
+    """The axis of a lane [m]."""
+    return [(float(p[0]), float(p[1])) for p in lane.getShape()]
+
+
+def lane_path(lanes: Sequence[Any]) -> Path:
+    """The centre line through lanes that follow each other."""
+    return Path(point for lane in lanes for point in lane_shape(lane))
+
+
+def _lane_area(lane: Any) -> shapely.Geometry:
+    """The surface of a lane."""
+    return LineString(lane_shape(lane)).buffer(
+        float(lane.getWidth()) / 2, cap_style="flat", join_style="mitre"
+    )
+
+
+def _check_root(file: FilePath) -> None:
+    """Refuse what is not XML, or XML that is not a SUMO network, with the line."""
+    opener = gzip.open if file.suffix == ".gz" else open
+    try:
+        with opener(file, "rb") as stream:
+            root = ""
+            for _, element in ElementTree.iterparse(stream, events=("start",)):
+                root = root or element.tag
+                if root != "net":
+                    break
+    except (ElementTree.ParseError, OSError, EOFError) as error:
+        raise NetworkError(f"network {str(file)!r}: not well-formed XML: {error}") from error
+    if root != "net":
+        raise NetworkError(
+            f"network {str(file)!r}: a SUMO network begins with <net>, this file with <{root}>"
+        )
+
+
+def _neighbours(file: FilePath) -> str:
+    """Names the networks that lie where the missing one was looked for."""
+    if not file.parent.is_dir():
+        return ""
+    found = sorted(p.name for p in file.parent.glob("*.net.xml*"))
+    return f"; {str(file.parent)!r} holds {', '.join(found[:6])}" if found else ""
+
+
+def _one_line(error: BaseException) -> str:
+    """An exception as one line."""
+    return " ".join(f"{type(error).__name__}: {error}".split())

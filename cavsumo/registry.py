@@ -1,0 +1,81 @@
+"""A table of names: register refuses duplicates, an unknown name suggests the nearest."""
+
+from __future__ import annotations
+
+import inspect
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass
+from typing import Any, Generic, TypeVar
+
+from cavsumo.errors import InputError, UnknownName
+
+T = TypeVar("T")
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """One parameter of a registered thing, as the listings show it."""
+
+    name: str
+    default: Any
+    doc: str
+
+
+class Registry(Generic[T]):
+    """Names to classes (or factories) of one sort: agents, egos, assertions.
+
+    Each is called with keyword parameters only; their defaults come from the signature, their
+    meaning and units from the class attribute ``PARAMETERS`` (name to one line).
+    """
+
+    def __init__(self, sort: str) -> None:
+        self.sort = sort
+        self._entries: dict[str, Callable[..., T]] = {}
+
+    def register(self, name: str) -> Callable[[Callable[..., T]], Callable[..., T]]:
+        """Decorator that files a class under a name; a name is given once."""
+
+        def file(entry: Callable[..., T]) -> Callable[..., T]:
+            if name in self._entries:
+                raise ValueError(f"{self.sort} {name!r} is registered already")
+            self._entries[name] = entry
+            return entry
+
+        return file
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(sorted(self._entries))
+
+    def get(self, name: str) -> Callable[..., T]:
+        """The class filed under a name, or UnknownName with the nearest one."""
+        if name not in self._entries:
+            raise UnknownName(self.sort, name, self._entries)
+        return self._entries[name]
+
+    def summary(self, name: str) -> str:
+        """The first line of the entry's docstring."""
+        return (inspect.getdoc(self.get(name)) or "").splitlines()[0]
+
+    def parameters(self, name: str) -> list[Parameter]:
+        """The parameters of an entry with default and meaning, in the order of its signature."""
+        entry = self.get(name)
+        docs: Mapping[str, str] = getattr(entry, "PARAMETERS", {})
+        return [
+            Parameter(p.name, p.default, docs.get(p.name, ""))
+            for p in inspect.signature(entry).parameters.values()
+            if p.kind in (p.POSITIONAL_OR_KEYWORD, p.KEYWORD_ONLY)
+        ]
+
+    def make(self, name: str, params: Mapping[str, Any]) -> T:
+        """Build an entry; unknown parameters and values that it refuses are InputErrors."""
+        entry = self.get(name)
+        known = [p.name for p in self.parameters(name)]
+        signature = inspect.signature(entry).parameters.values()
+        free = any(p.kind is p.VAR_KEYWORD for p in signature)
+        for key in params:
+            if key not in known and not free:
+                raise UnknownName("parameter", key, known, f"{self.sort} {name}")
+        try:
+            return entry(**params)
+        except (TypeError, ValueError) as error:
+            raise InputError(f"{self.sort} {name}: {error}") from error

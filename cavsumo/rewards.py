@@ -1,0 +1,71 @@
+"""What the tester spends and earns: the reward R of the seed's game, as a shortest path problem.
+
+Reaching the goal (the precondition of an assertion) is worth GOAL; time and time on the
+carriageway cost. Everything else, an unfair episode included, is worth nothing.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from cavsumo.agents.base import Scene
+from cavsumo.assertions.base import UNFAIR, Judgement
+from cavsumo.snapshot import BodyState, Snapshot
+
+GOAL = 100.0
+TIME_COST = 1.0  # per second and agent
+ROAD_COST = 1.0  # per second that a body's centre is on the carriageway
+
+
+class Ledger:
+    """The account of one episode.
+
+    Attributes:
+        cost: time that the testers' bodies spent on the carriageway, together [s].
+        total: the agents' rewards together, undiscounted.
+    """
+
+    def __init__(self, scene: Scene, teams: Sequence[Sequence[int]]) -> None:
+        self.cost = self.total = 0.0
+        self._dt, self._roads, self._teams = scene.dt, scene.roads, teams
+        self._over = False
+        # Whether a body is on the carriageway, and until which step that cannot change: it has
+        # to walk to the next edge first.
+        self._known = [(False, -1)] * len(scene.bodies)
+
+    def rewards(
+        self, successor: Snapshot, judgements: Sequence[Judgement]
+    ) -> tuple[list[float], bool] | None:
+        """Each agent's reward for a timestep and whether the game ends; None once it is over."""
+        on_road = [self._is_on_road(i, b, successor.step) for i, b in enumerate(successor.testers)]
+        self.cost += self._dt * sum(on_road)
+        if self._over:
+            return None
+        winners = {j.tester for j in judgements if j.triggered and j.tester}
+        self._over = bool(winners) or any(j.verdict == UNFAIR for j in judgements)
+        rewards = [
+            GOAL * any(successor.testers[i].id in winners for i in team)
+            - self._dt * (TIME_COST + ROAD_COST * sum(on_road[i] for i in team))
+            for team in self._teams
+        ]
+        self.total += sum(rewards)
+        return rewards, self._over
+
+    def lost(self) -> tuple[list[float], bool] | None:
+        """The last reward when the ego got away: a dead end for every agent."""
+        if self._over:
+            return None
+        self._over = True
+        rewards = [-self._dt * TIME_COST for _ in self._teams]
+        self.total += sum(rewards)
+        return rewards, True
+
+    def _is_on_road(self, i: int, body: BodyState, step: int) -> bool:
+        """Whether a body's centre is on the carriageway."""
+        on_road, until = self._known[i]
+        if self._roads is not None and step >= until:
+            on_road = self._roads.contains(body.x, body.y)
+            walked = body.body.kind.v_max * self._dt
+            safe = int(self._roads.edge_distance(body.x, body.y) / walked)
+            self._known[i] = on_road, step + max(1, safe)
+        return on_road

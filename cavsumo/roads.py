@@ -1,0 +1,136 @@
+"""Where the carriageway is and how to get across it, on any road of any network.
+
+Pure geometry (shapely): built from polygons and lane axes, knows neither files nor SUMO.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import shapely
+from shapely.geometry import LineString, Point
+
+from cavsumo.paths import Path
+
+REACH_M = 60.0  # how far a crossing line is followed; wider carriageways are not crossed
+ISLAND_M = 1.5  # traffic islands narrower than this are walked over
+BEYOND_M = 1.0  # how far past the far kerb a body walks that starts on the carriageway
+
+
+@dataclass(frozen=True, slots=True)
+class Crossing:
+    """A straight way across the carriageway.
+
+    Attributes:
+        x, y: where it starts [m].
+        heading: its direction [rad].
+        enter, leave: distances from the start to the near and the far edge of the carriageway [m].
+        length: where the way ends: as far beyond the far edge as it began before the near one,
+            CAV-Gym's mirror point [m].
+    """
+
+    x: float
+    y: float
+    heading: float
+    enter: float
+    leave: float
+    length: float
+
+    def progress(self, x: float, y: float) -> float:
+        """How far along the way a point is [m]."""
+        return (x - self.x) * math.cos(self.heading) + (y - self.y) * math.sin(self.heading)
+
+
+@dataclass(frozen=True, slots=True)
+class Start:
+    """Where a tester's body starts, and the pavement it stands on.
+
+    Attributes:
+        x, y, o: position [m] and orientation [rad].
+        pavement: axis of the pavement, or None away from any.
+        lateral: offset from that axis, positive to its left [m].
+        forwards: whether the body faces along the axis (True) or against it.
+        walk: ids of edges along which SUMO may believe a person here to walk.
+    """
+
+    x: float
+    y: float
+    o: float
+    pavement: Path | None = None
+    lateral: float = 0.0
+    forwards: bool = True
+    walk: tuple[str, ...] = ()
+
+
+class Roads:
+    """The carriageways of a network.
+
+    Args:
+        carriageway: the union of all lanes for vehicles, junctions included.
+        lanes: axes of the lanes for vehicles outside junctions; they give a road its direction.
+    """
+
+    def __init__(self, carriageway: shapely.Geometry, lanes: Sequence[LineString]) -> None:
+        self.carriageway = carriageway
+        self.lanes = list(lanes)
+        self._index = shapely.STRtree(self.lanes)
+        shapely.prepare(self.carriageway)
+
+    def __reduce__(self) -> tuple[type[Roads], tuple[shapely.Geometry, list[LineString]]]:
+        return Roads, (self.carriageway, self.lanes)
+
+    def contains(self, x: float, y: float) -> bool:
+        """Whether a point lies on the carriageway."""
+        return bool(shapely.contains_xy(self.carriageway, x, y))
+
+    def edge_distance(self, x: float, y: float) -> float:
+        """Distance to the nearest edge of a carriageway [m]."""
+        return float(self.carriageway.boundary.distance(Point(x, y)))
+
+    def crossing(self, x: float, y: float) -> Crossing | None:
+        """The way straight across the nearest road from a point, or None where there is none."""
+        here = Point(x, y)
+        lane = self.lanes[int(self._index.nearest(here))]
+        heading = _across(lane, here)
+        ray = LineString(
+            [(x, y), (x + REACH_M * math.cos(heading), y + REACH_M * math.sin(heading))]
+        )
+        span = _first_span(here, ray.intersection(self.carriageway))
+        if span is None:
+            return None
+        enter, leave = span
+        beyond = enter if enter > 0.01 else BEYOND_M
+        return Crossing(x, y, heading, enter, leave, leave + beyond)
+
+
+def _across(lane: LineString, here: Point) -> float:
+    """Heading at right angles to a lane, from a point towards it."""
+    along = lane.project(here)
+    step = min(0.5, lane.length / 4)
+    a = lane.interpolate(max(0.0, along - step))
+    b = lane.interpolate(min(lane.length, along + step))
+    tangent = math.atan2(b.y - a.y, b.x - a.x)
+    nearest = lane.interpolate(along)
+    left = math.cos(tangent) * (here.y - nearest.y) - math.sin(tangent) * (here.x - nearest.x) > 0
+    turn = -math.pi / 2 if left else math.pi / 2
+    return math.atan2(math.sin(tangent + turn), math.cos(tangent + turn))
+
+
+def _first_span(here: Point, cut: shapely.Geometry) -> tuple[float, float] | None:
+    """Distances at which a ray enters and leaves the first carriageway it meets."""
+    spans = sorted(
+        (min(ds), max(ds))
+        for part in getattr(cut, "geoms", [cut])
+        if part.geom_type == "LineString" and not part.is_empty
+        for ds in [[here.distance(Point(p)) for p in part.coords]]
+    )
+    if not spans:
+        return None
+    enter, leave = spans[0]
+    for low, high in spans[1:]:
+        if low - leave > ISLAND_M:
+            break
+        leave = max(leave, high)
+    return enter, leave

@@ -1,0 +1,162 @@
+"""Everything that defines a test, validated, from TOML or the command line.
+
+``Scenario`` says what is simulated, ``BatchPlan`` how often and with which agents. Unknown keys
+are refused with the nearest valid one.
+"""
+
+from __future__ import annotations
+
+import math
+import tomllib
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_validator
+
+from cavsumo.errors import InputError, UnknownName
+
+Finite = Annotated[float, Field(allow_inf_nan=False)]
+Params = dict[str, bool | int | float | str]
+
+
+class Scenario(BaseModel):
+    """One test scenario; every field has its unit in its description."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+    net: Path = Field(description="SUMO network")
+    routes: Path | None = Field(None, description="background demand; none for empty roads")
+    additional: tuple[Path, ...] = Field((), description="SUMO additional files")
+    ego: str = Field("sumo", description="registered ego or module:Class")
+    ego_params: Params = Field(default_factory=dict, description="parameters of the ego")
+    ego_route: tuple[str, ...] = Field((), description="edges of the ego's route")
+    junction: str | None = Field(None, description="junction under test")
+    testers: int = Field(3, ge=1, le=100, description="number of tester bodies")
+    kind: str = Field("pedestrian", description="kind of the tester bodies")
+    bodies_per_agent: int = Field(1, ge=1, description="bodies that one agent owns")
+    start_speed: Finite | None = Field(
+        None, ge=0, description="speed of the testers at the start [m/s]; their maximum if not given"
+    )
+    embodiment: Literal["vehicle", "person"] = Field(
+        "vehicle", description="how SUMO is shown a tester pedestrian"
+    )
+    sumo_width: Finite = Field(
+        0.05, ge=0.01, le=5, description="width that SUMO is shown of a tester pedestrian [m]"
+    )
+    end: Finite = Field(60.0, gt=0, le=36000, description="horizon of an episode [s]")
+    step_length: Finite = Field(0.1, ge=0.001, le=1, description="timestep lambda [s]")
+    assertions: tuple[str, ...] = Field(("reaction-zone",), description="what the ego must keep")
+    assertion_params: Params = Field(default_factory=dict, description="their parameters")
+
+    @field_validator("step_length")
+    @classmethod
+    def _whole_milliseconds(cls, value: float) -> float:
+        """SUMO's clock counts milliseconds; anything else would drift silently."""
+        if not math.isclose(value * 1000, round(value * 1000), abs_tol=1e-6):
+            raise ValueError("must be a whole number of milliseconds, as SUMO's clock")
+        return round(value, 3)
+
+    @property
+    def name(self) -> str:
+        """The network's name without its endings."""
+        return self.net.name.removesuffix(".gz").removesuffix(".xml").removesuffix(".net")
+
+
+class BatchPlan(BaseModel):
+    """How a scenario is played: by which agents, how often, from which seed."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+    scenario: Scenario
+    agents: tuple[str, ...] = Field(("timing",), min_length=1)
+    params: Params = Field(default_factory=dict)
+    runs: int = Field(100, ge=1, le=10_000_000)
+    seed: int = Field(1, ge=0, le=2**63 - 1)
+    trace: Literal["none", "tests", "all"] = "tests"
+    deadline_s: Finite = Field(120.0, gt=0)
+
+    def agent_params(self, agent: str, known: Mapping[str, list[str]]) -> Params:
+        """The parameters meant for one agent: its own (``agent.key``) and those it knows."""
+        prefix = f"{agent}."
+        mine = {k: v for k, v in self.params.items() if "." not in k and k in known[agent]}
+        return mine | {
+            k.removeprefix(prefix): v for k, v in self.params.items() if k.startswith(prefix)
+        }
+
+
+SCENARIO_KEYS = frozenset(Scenario.model_fields)
+PLAN_KEYS = frozenset(BatchPlan.model_fields) - {"scenario"}
+PATH_KEYS = ("net", "routes", "additional")
+
+
+def read_config(file: Path) -> dict[str, Any]:
+    """The keys of a scenario file (TOML), paths resolved against its folder."""
+    try:
+        data = tomllib.loads(file.read_text(encoding="utf-8"))
+    except OSError as error:
+        raise InputError(f"config {str(file)!r}: {error.strerror}") from error
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        raise InputError(f"config {str(file)!r}: {error}") from error
+    for key in data:
+        if key not in SCENARIO_KEYS | PLAN_KEYS:
+            raise UnknownName("key", key, SCENARIO_KEYS | PLAN_KEYS, str(file))
+    return {k: _resolved(k, v, file.parent) for k, v in data.items()}
+
+
+def plan_from(settings: Mapping[str, Any], source: str) -> BatchPlan:
+    """Validate flat settings (from a file, the command line or both) into a plan.
+
+    A route file that lies beside the network (``routes/NAME.rou.xml`` next to its folder) is
+    found when none is named; ``routes = "none"`` keeps the roads empty.
+    """
+    if "net" not in settings:
+        raise InputError(f"{source}: no network given; name one with --net FILE")
+    scenario = {k: v for k, v in settings.items() if k in SCENARIO_KEYS}
+    scenario["routes"] = _route_file(Path(scenario["net"]), scenario.get("routes"))
+    try:
+        plan = BatchPlan(
+            scenario=Scenario(**scenario),
+            **{k: v for k, v in settings.items() if k in PLAN_KEYS},
+        )
+    except ValidationError as error:
+        raise InputError(f"{source}: {_first_problem(error)}") from error
+    for file in (plan.scenario.routes, *plan.scenario.additional):
+        if file is not None and not file.is_file():
+            raise InputError(f"{source}: no such file: {str(file)!r}")
+    if plan.scenario.testers % plan.scenario.bodies_per_agent:
+        raise InputError(
+            f"{source}: bodies_per_agent {plan.scenario.bodies_per_agent} does not divide "
+            f"testers {plan.scenario.testers}"
+        )
+    return plan
+
+
+def _route_file(net: Path, given: Any) -> Path | None:
+    """The route file named, the one belonging to the network, or None."""
+    if given is not None:
+        return None if str(given) == "none" else Path(given)
+    stem = net.name.removesuffix(".gz").removesuffix(".xml").removesuffix(".net")
+    for folder in (net.parent.parent / "routes", net.parent):
+        file = folder / f"{stem}.rou.xml"
+        if file.is_file():
+            return file
+    return None
+
+
+def _resolved(key: str, value: Any, folder: Path) -> Any:
+    """A path of a scenario file, relative to that file, as SUMO has it in its own."""
+    if key not in PATH_KEYS or value == "none":
+        return value
+    if isinstance(value, list):
+        return [str(folder / str(v)) for v in value]
+    return str(folder / str(value))
+
+
+def _first_problem(error: ValidationError) -> str:
+    """The first of pydantic's findings as one sentence."""
+    problem = error.errors()[0]
+    place = ".".join(str(p) for p in problem["loc"] if p not in ("scenario",))
+    message = problem["msg"].removeprefix("Value error, ")
+    given = "" if problem["type"] == "missing" else f", got {problem['input']!r}"
+    return f"{place}: {message}{given}"

@@ -1,0 +1,212 @@
+"""Algorithm 1 of the seed: agents, ego and world, one timestep after another.
+
+The truth about the testers' bodies is integrated here by the kinematics; the world is told.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from cavsumo.agents.base import Agent, Scene
+from cavsumo.assertions.base import SEVERITY, Assertion, Judgement
+from cavsumo.bodies import Action, Body, Kind
+from cavsumo.contacts import ContactMonitor
+from cavsumo.egos.base import Drive, Ego
+from cavsumo.errors import AgentError
+from cavsumo.kinematics import step_floats
+from cavsumo.rewards import Ledger
+from cavsumo.roads import Start
+from cavsumo.site import Site
+from cavsumo.snapshot import BodyState, Snapshot
+from cavsumo.starts import draw_starts
+from cavsumo.world import World
+
+# An episode whose verdict is open at the horizon may run on for this long [s].
+OVERTIME_S = 15.0
+
+
+@dataclass(frozen=True)
+class Stage:
+    """All that episodes of one scenario share.
+
+    Attributes:
+        world, site, ego, assertions: as built from the scenario.
+        teams: the agents' bodies: for each agent the indices of those it owns.
+        bodies: the testers' bodies.
+        horizon: length of an episode [s].
+        start_speed: of the testers [m/s]; None for their maximum.
+    """
+
+    world: World
+    site: Site
+    ego: Ego
+    assertions: tuple[Assertion, ...]
+    teams: tuple[tuple[int, ...], ...]
+    bodies: tuple[Body, ...]
+    horizon: float
+    start_speed: float | None = None
+
+
+@dataclass
+class Episode:
+    """What happened, while and after it happens."""
+
+    judgement: Judgement
+    steps: int = 0
+    time: float = 0.0
+    max_decel: float = 0.0
+    contacts: ContactMonitor = field(default_factory=ContactMonitor)
+    cost: float = 0.0
+    reward: float = 0.0
+    sumo_collisions: frozenset[tuple[str, str]] = frozenset()
+    teleports: int = 0
+    emergency_stops: int = 0
+    frames: list[Snapshot] = field(default_factory=list)
+
+
+def play(stage: Stage, agents: Sequence[Agent], seed: int, *, record: bool = False) -> Episode:
+    """One episode (Algorithm 1).
+
+    Args:
+        agents: one for each team, kept from episode to episode, so that learners learn.
+        seed: of the episode; every random number in it comes from here.
+        record: keep every snapshot.
+    """
+    scene, snapshot = _reset(stage, agents, seed)
+    ledger = Ledger(scene, stage.teams)
+    episode = Episode(Judgement(""))
+    _observe(stage, episode, snapshot, record)
+    while not _over(stage, snapshot):
+        actions = [agent.choose_action(snapshot) for agent in agents]
+        states = _moved(snapshot.testers, stage.teams, actions, scene.dt)
+        command = stage.ego.act(snapshot)
+        successor = stage.world.step(states, command)
+        if successor is None or (isinstance(command, Drive) and _at_end(scene, successor)):
+            _feed_back(agents, snapshot, actions, ledger.lost(), snapshot)
+            break
+        episode.max_decel = max(episode.max_decel, (snapshot.ego.v - successor.ego.v) / scene.dt)
+        _observe(stage, episode, successor, record)
+        rewards = ledger.rewards(successor, [a.judgement for a in stage.assertions])
+        _feed_back(agents, snapshot, actions, rewards, successor)
+        snapshot = successor
+    return _finished(stage, episode, snapshot, ledger)
+
+
+def _reset(stage: Stage, agents: Sequence[Agent], seed: int) -> tuple[Scene, Snapshot]:
+    """Draw the starts and begin an episode; one generator for each who draws."""
+    streams = np.random.SeedSequence(seed).spawn(2 + len(agents))
+    placing, electing, *rest = (np.random.default_rng(s) for s in streams)
+    kinds = [body.kind for body in stage.bodies]
+    starts = draw_starts(stage.site.areas, kinds, placing)
+    scene = Scene(
+        stage.world.dt,
+        stage.world.ego_body,
+        stage.site.route.path,
+        stage.bodies,
+        starts,
+        stage.site.roads,
+    )
+    snapshot = stage.world.reset(seed, _states(stage, starts), starts)
+    for agent, team, rng in zip(agents, stage.teams, rest, strict=True):
+        agent.reset(scene, team, rng)
+    type(agents[0]).coordinate(agents, electing)
+    stage.ego.reset(scene)
+    for assertion in stage.assertions:
+        assertion.reset(scene)
+    return scene, snapshot
+
+
+def _states(stage: Stage, starts: Sequence[Start]) -> list[BodyState]:
+    """The testers' first states."""
+
+    def speed(kind: Kind) -> float:
+        return kind.v_max if stage.start_speed is None else min(kind.v_max, stage.start_speed)
+
+    return [
+        BodyState(body, start.x, start.y, speed(body.kind), start.o)
+        for body, start in zip(stage.bodies, starts, strict=True)
+    ]
+
+
+def _moved(
+    testers: Sequence[BodyState],
+    teams: Sequence[Sequence[int]],
+    actions: Sequence[Sequence[Action]],
+    dt: float,
+) -> tuple[BodyState, ...]:
+    """The testers' next states by the kinematics (seed, eqs 8 to 19)."""
+    moved = list(testers)
+    for team, joint in zip(teams, actions, strict=True):
+        if len(joint) != len(team):
+            raise AgentError(f"an agent with {len(team)} bodies chose {len(joint)} actions")
+        for i, (throttle, steering) in zip(team, joint, strict=True):
+            body, x, y, v, o = testers[i]
+            kind = body.kind
+            if not (
+                kind.throttle_min - 1e-9 <= throttle <= kind.throttle_max + 1e-9
+                and abs(steering) <= kind.steering_max + 1e-9
+            ):
+                raise AgentError(f"{body.id}: no such action: {throttle=}, {steering=}")
+            moved[i] = BodyState(
+                body,
+                *step_floats(
+                    x, y, v, o, throttle, steering, kind.wheelbase, kind.v_min, kind.v_max, dt
+                ),
+            )
+    return tuple(moved)
+
+
+def _observe(stage: Stage, episode: Episode, snapshot: Snapshot, record: bool) -> None:
+    """Show a snapshot to the monitors and the assertions."""
+    contacts = episode.contacts.observe(snapshot)
+    for assertion in stage.assertions:
+        assertion.observe(snapshot, contacts)
+    if record:
+        episode.frames.append(snapshot)
+
+
+def _feed_back(
+    agents: Sequence[Agent],
+    snapshot: Snapshot,
+    actions: Sequence[tuple[Action, ...]],
+    rewards: tuple[list[float], bool] | None,
+    successor: Snapshot,
+) -> None:
+    """ProcessFeedback for every agent, until the game is over."""
+    if rewards is None:
+        return
+    for agent, action, reward in zip(agents, actions, rewards[0], strict=True):
+        agent.process_feedback(snapshot, action, reward, successor, rewards[1])
+
+
+def _over(stage: Stage, snapshot: Snapshot) -> bool:
+    """The terminator psi: every assertion decided, or the horizon with none pending."""
+    if all(a.decided for a in stage.assertions):
+        return True
+    left = stage.horizon - snapshot.time
+    if left > 1e-9:
+        return False
+    return left < -OVERTIME_S or not any(a.pending for a in stage.assertions)
+
+
+def _at_end(scene: Scene, snapshot: Snapshot) -> bool:
+    """Whether a freely driving ego has come to the end of its path."""
+    ego, path = snapshot.ego, scene.ego_path
+    return path.project(ego.x, ego.y).along >= path.length - ego.body.kind.length / 2
+
+
+def _finished(stage: Stage, episode: Episode, snapshot: Snapshot, ledger: Ledger) -> Episode:
+    """The episode with its totals."""
+    judgements = [a.judgement for a in stage.assertions]
+    episode.judgement = min(judgements, key=lambda j: SEVERITY.index(j.verdict))
+    episode.steps, episode.time = snapshot.step, snapshot.time
+    episode.cost, episode.reward = ledger.cost, ledger.total
+    world = stage.world
+    episode.sumo_collisions = frozenset(world.collisions)
+    episode.teleports, episode.emergency_stops = world.teleports, world.emergency_stops
+    assert math.isfinite(episode.reward)
+    return episode

@@ -1,0 +1,54 @@
+"""Where a test takes place: what was derived from the network, ready for every episode.
+
+A plain picklable record, derived once by the parent and handed to the processes that simulate.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import shapely
+
+from cavsumo.ego_routes import EgoRoute, derived_route, given_route
+from cavsumo.network import read_network
+from cavsumo.roads import Roads
+from cavsumo.starts import StartingArea, starting_areas
+
+
+@dataclass(frozen=True)
+class Site:
+    """A network as one scenario uses it.
+
+    Attributes:
+        net: the network file.
+        route: the ego's route.
+        roads: carriageways and the ways across them.
+        areas: where the testers may start.
+        crossings: the surface of the marked crossings.
+    """
+
+    net: Path
+    route: EgoRoute
+    roads: Roads
+    areas: tuple[StartingArea, ...]
+    crossings: shapely.Geometry
+
+
+def derive_site(
+    net: Path, ego_route: tuple[str, ...], junction: str | None, ego_length: float
+) -> Site:
+    """Read a network and derive the ego's route and the testers' starting areas.
+
+    Raises InputError (UnknownName, NetworkError) in one sentence.
+    """
+    network = read_network(net)
+    half = ego_length / 2
+    route = (
+        given_route(network, ego_route, half)
+        if ego_route
+        else derived_route(network, junction, half)
+    )
+    roads = network.roads()
+    areas = starting_areas(network, roads, route.path)
+    return Site(net, route, roads, areas, network.crossing_surface())

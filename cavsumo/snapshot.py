@@ -1,0 +1,64 @@
+"""What everybody sees at one timestep: immutable, complete, cheap to make.
+
+Background bodies are kept as the plain tuples that the world read and become records only when
+somebody asks for them, because most agents never do.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+from cavsumo.bodies import Body
+from cavsumo.geometry import Box
+
+
+class BodyState(NamedTuple):
+    """A body and its state (seed, appendix): position of the box's centre, speed, orientation."""
+
+    body: Body
+    x: float  # m
+    y: float  # m
+    v: float  # m/s
+    o: float  # rad, anticlockwise from east, in (-pi, pi]
+
+    @property
+    def id(self) -> str:
+        """The body's id."""
+        return self.body.id
+
+    @property
+    def box(self) -> Box:
+        """The body's oriented box."""
+        kind = self.body.kind
+        return Box(self.x, self.y, self.o, kind.length, kind.width)
+
+
+RawState = tuple[Body, float, float, float, float]
+
+
+@dataclass(frozen=True, slots=True)
+class Snapshot:
+    """The state s of the simulation.
+
+    Attributes:
+        step: number of timesteps since the ego entered the network.
+        time: simulation time since then [s].
+        ego: the vehicle under test.
+        ego_steering: its steering angle in the last timestep [rad]; for an ego that SUMO moves,
+            the angle that its turn implies (seed, eq. 22).
+        testers: the tester's bodies, in the order of the scenario.
+        raw_background: everybody else, as plain tuples in the field order of BodyState.
+    """
+
+    step: int
+    time: float
+    ego: BodyState
+    ego_steering: float
+    testers: tuple[BodyState, ...]
+    raw_background: tuple[RawState, ...] = ()
+
+    @property
+    def background(self) -> tuple[BodyState, ...]:
+        """Everybody else, as records (made anew at each call)."""
+        return tuple(BodyState(*raw) for raw in self.raw_background)

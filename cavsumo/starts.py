@@ -1,0 +1,130 @@
+"""Where tester pedestrians start: on the pavements beside the ego's path, seeded."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from shapely.geometry import LineString
+
+from cavsumo.bodies import Kind
+from cavsumo.errors import NetworkError
+from cavsumo.network import Network, lane_shape, pavement_walk
+from cavsumo.paths import Path
+from cavsumo.roads import Roads, Start
+
+NEAR_M = 20.0  # pavements farther than this from the ego's path are left out
+PIECE_M = 1.0  # resolution at which a pavement is judged
+APART_M = 1.2  # two testers do not start closer together than this
+ATTEMPTS = 50
+
+
+@dataclass(frozen=True)
+class StartingArea:
+    """A stretch of pavement from which a pedestrian can cross the ego's path.
+
+    Attributes:
+        pavement: its axis.
+        begin, end: the stretch, as arc lengths on the axis [m].
+        width: of the pavement [m].
+        walk: ids of its edge and of one that leads on from it, for SUMO's persons.
+    """
+
+    pavement: Path
+    begin: float
+    end: float
+    width: float
+    walk: tuple[str, ...]
+
+
+def starting_areas(network: Network, roads: Roads, ego_path: Path) -> tuple[StartingArea, ...]:
+    """All stretches of pavement near the ego's path whose way across the road meets it.
+
+    Raises NetworkError when the network has no pavements, or none of them lies near enough.
+    """
+    pavements = list(network.pavements())
+    if not pavements:
+        raise NetworkError(
+            f"{network.file}: has no pavements for pedestrians to start on; rebuild it with "
+            "netconvert --sidewalks.guess --crossings.guess"
+        )
+    line = LineString(ego_path.points)
+    areas = [
+        area
+        for lane in pavements
+        if LineString(lane_shape(lane)).distance(line) <= NEAR_M
+        for area in _stretches(lane, roads, line)
+    ]
+    if not areas:
+        raise NetworkError(
+            f"{network.file}: no pavement lies beside the ego's route; choose another with "
+            "--ego-route or --junction"
+        )
+    return tuple(areas)
+
+
+def draw_starts(
+    areas: Sequence[StartingArea], kinds: Sequence[Kind], rng: np.random.Generator
+) -> tuple[Start, ...]:
+    """One start for each body, uniform over the areas, apart from each other, facing along.
+
+    Consumes the generator. Raises NetworkError when the bodies do not fit.
+    """
+    starts: list[Start] = []
+    for kind in kinds:
+        for _ in range(ATTEMPTS):
+            start = _draw(areas, kind, rng)
+            if all(math.dist((start.x, start.y), (s.x, s.y)) > APART_M for s in starts):
+                starts.append(start)
+                break
+        else:
+            raise NetworkError(f"no room for {len(kinds)} testers on the pavements: use fewer")
+    return tuple(starts)
+
+
+def _stretches(lane: Any, roads: Roads, ego_line: LineString) -> list[StartingArea]:
+    """The runs of a pavement whose pieces all lead across the ego's path."""
+    pavement, width = Path(lane_shape(lane)), float(lane.getWidth())
+    walk = pavement_walk(lane.getEdge())
+    count = max(1, round(pavement.length / PIECE_M))
+    piece = pavement.length / count
+    stretches: list[StartingArea] = []
+    begin: float | None = None
+    for i in range(count + 1):
+        good = i < count and _meets(roads, ego_line, *pavement.at((i + 0.5) * piece)[:2])
+        if good and begin is None:
+            begin = i * piece
+        elif not good and begin is not None:
+            stretches.append(StartingArea(pavement, begin, i * piece, width, walk))
+            begin = None
+    return stretches
+
+
+def _meets(roads: Roads, ego_line: LineString, x: float, y: float) -> bool:
+    """Whether the way across the road from a point crosses the ego's path."""
+    way = roads.crossing(x, y)
+    if way is None or way.enter > NEAR_M:
+        return False
+    end = (x + way.leave * math.cos(way.heading), y + way.leave * math.sin(way.heading))
+    return bool(LineString([(x, y), end]).intersects(ego_line))
+
+
+def _draw(areas: Sequence[StartingArea], kind: Kind, rng: np.random.Generator) -> Start:
+    """A start for a body of that kind, its box on the pavement whichever way it turns."""
+    margin = math.hypot(kind.length, kind.width) / 2
+    weights = np.array([(a.end - a.begin) * a.width for a in areas])
+    area = areas[int(rng.choice(len(areas), p=weights / weights.sum()))]
+    low = min(max(area.begin, margin), area.pavement.length / 2)
+    high = max(min(area.end, area.pavement.length - margin), low)
+    along = float(rng.uniform(low, high))
+    room = max(0.0, area.width / 2 - margin)
+    lateral = float(rng.uniform(-room, room))
+    forwards = bool(rng.integers(2))
+    x, y, o = area.pavement.at(along)
+    x, y = x - lateral * math.sin(o), y + lateral * math.cos(o)
+    if not forwards:
+        o = math.atan2(-math.sin(o), -math.cos(o))
+    return Start(x, y, o, area.pavement, lateral, forwards, area.walk)

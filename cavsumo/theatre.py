@@ -1,0 +1,113 @@
+"""A plan set up in the process that simulates: from a job to an episode to a row."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Sequence
+from typing import Any
+
+from cavsumo.agents import Agent
+from cavsumo.assertions import ASSERTIONS
+from cavsumo.egos import make_ego
+from cavsumo.errors import CavsumoError
+from cavsumo.jobs import Job, episode_seed, failed, head, make_agents, teams, tester_bodies
+from cavsumo.outcomes import Outcome, Row, frame
+from cavsumo.scenario import BatchPlan
+from cavsumo.simulator import Episode, Stage, play
+from cavsumo.site import Site
+from cavsumo.world import World
+
+
+class Theatre:
+    """A plan set up in this process: plays jobs one after another; a context manager."""
+
+    def __init__(self, plan: BatchPlan, site: Site) -> None:
+        self.plan = plan
+        scenario = plan.scenario
+        ego = make_ego(scenario.ego, scenario.ego_params)
+        self.stage = Stage(
+            world=World(scenario, site, ego),
+            site=site,
+            ego=ego,
+            assertions=tuple(
+                ASSERTIONS.make(name, scenario.assertion_params) for name in scenario.assertions
+            ),
+            teams=teams(scenario),
+            bodies=tester_bodies(scenario),
+            horizon=scenario.end,
+            start_speed=scenario.start_speed,
+        )
+        self._agents: dict[str, list[Agent]] = {}
+
+    def __enter__(self) -> Theatre:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.stage.world.close()
+
+    def rehearse(self) -> None:
+        """Start SUMO once, so that what it refuses comes out before anything is written."""
+        self.stage.world.reset(episode_seed(self.plan.seed, 0), (), ())
+
+    def play(self, job: Job) -> tuple[Outcome, tuple[Any, ...] | None]:
+        """Play a job: its outcome, and what the agents know afterwards if they learn."""
+        begun = time.perf_counter()
+        try:
+            agents = self._cast(job)
+            episode = play(
+                self.stage, agents, job.seed, record=job.record or self.plan.trace != "none"
+            )
+            row = _row(self.plan, job, episode)
+            memory = _recall(agents)
+        except CavsumoError as error:
+            return failed(self.plan, job, str(error), time.perf_counter() - begun), job.memory
+        row["wall_s"] = time.perf_counter() - begun
+        return Outcome(row, self._kept(job, episode)), memory
+
+    def _cast(self, job: Job) -> list[Agent]:
+        """The agents of a job, with their memory."""
+        if job.agent not in self._agents:
+            self._agents[job.agent] = make_agents(self.plan, job.agent)
+        agents = self._agents[job.agent]
+        for agent, memory in zip(agents, job.memory or (), strict=False):
+            agent.remember(memory)
+        return agents
+
+    def _kept(self, job: Job, episode: Episode) -> list[dict[str, Any]]:
+        """The frames worth keeping: of tests found, or of every episode if asked."""
+        if job.record or (self.plan.trace == "tests" and episode.judgement.triggered):
+            return [frame(s) for s in episode.frames]
+        return []
+
+
+def _row(plan: BatchPlan, job: Job, episode: Episode) -> Row:
+    """The row of a finished episode."""
+    judgement, contacts = episode.judgement, episode.contacts
+    with_ego = {pair for pair in episode.sumo_collisions if "ego" in pair}
+    return head(plan, job) | {
+        "outcome": judgement.verdict,
+        "assertion": judgement.assertion if judgement.triggered else "",
+        "tester": judgement.tester,
+        "trigger_time_s": judgement.trigger_time,
+        "violation_time_s": judgement.violation_time,
+        "time_s": episode.time,
+        "steps": episode.steps,
+        "min_gap_m": contacts.min_gap,
+        "ego_speed_mps": judgement.ego_speed,
+        "impact_speed_mps": judgement.impact_speed,
+        "max_decel_mps2": episode.max_decel,
+        "cost": episode.cost,
+        "reward": episode.reward,
+        "contacts": len(contacts.ego_pairs),
+        "tester_contacts": len(contacts.tester_pairs),
+        "sumo_collisions": len(with_ego),
+        "background_collisions": len(episode.sumo_collisions - with_ego),
+        "emergency_stops": episode.emergency_stops,
+        "teleports": episode.teleports,
+    }
+
+
+def _recall(agents: Sequence[Agent]) -> tuple[Any, ...] | None:
+    """What the agents learned, None when none of them does."""
+    memory = tuple(agent.recall() for agent in agents)
+    return None if all(m is None for m in memory) else memory

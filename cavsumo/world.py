@@ -1,0 +1,309 @@
+"""The one boundary to SUMO; nothing else imports libsumo.
+
+SUMO learns where the bodies are and moves the background traffic (and the ego, unless a
+controller drives it). What it says about moved bodies is never read back: their truth is in
+Python. Angles and reference points are converted here and nowhere else:
+
+* cavsumo: the centre of the box [m], radians anticlockwise from east;
+* SUMO: the middle of the front edge [m], degrees clockwise from north.
+
+Each process has one simulation: libsumo knows no second one.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from types import TracebackType
+from typing import Any
+from xml.sax.saxutils import quoteattr
+
+import libsumo
+import shapely
+
+from cavsumo.bodies import CAR, KINDS, PEDESTRIAN, Body, Kind
+from cavsumo.egos.base import Acceleration, Command, Drive, Ego
+from cavsumo.errors import NoSuchAction, SimulationError
+from cavsumo.kinematics import steering_for_turn, step_floats, wrap
+from cavsumo.options import OPTIONS
+from cavsumo.roads import Start
+from cavsumo.scenario import Scenario
+from cavsumo.site import Site
+from cavsumo.snapshot import BodyState, RawState, Snapshot
+
+EGO = "ego"
+ENTRY_S = 30.0  # how long the ego may wait for room to enter the network
+KEEP_EXACT = 2  # moveToXY: exactly there, on the network or off it
+KEEP_EXACT_ANY_LANE = 6  # the same for persons, on lanes for cars too
+UNSAFE = 0  # setSpeedMode: no check of SUMO's own interferes with what was commanded
+
+
+def to_sumo(x: float, y: float, o: float, length: float) -> tuple[float, float, float]:
+    """Centre and radians to the middle of the front edge and SUMO's degrees."""
+    half = length / 2
+    return x + half * math.cos(o), y + half * math.sin(o), (90.0 - math.degrees(o)) % 360.0
+
+
+def from_sumo(x: float, y: float, angle: float, length: float) -> tuple[float, float, float]:
+    """The middle of the front edge and SUMO's degrees to centre and radians in (-pi, pi]."""
+    o, half = wrap(math.radians(90.0 - angle)), length / 2
+    return x - half * math.cos(o), y - half * math.sin(o), o
+
+
+class World:
+    """One SUMO simulation at a time; a context manager.
+
+    Attributes:
+        collisions: pairs that SUMO itself reported as colliding in this episode.
+        teleports, emergency_stops: how many SUMO reported in this episode.
+    """
+
+    def __init__(self, scenario: Scenario, site: Site, ego: Ego) -> None:
+        self.scenario, self.site, self.ego = scenario, site, ego
+        self.dt = scenario.step_length
+        self.ego_body = Body(EGO, ego.kind)
+        self._folder = TemporaryDirectory(prefix="cavsumo-")
+        self._log = Path(self._folder.name) / "errors.log"
+        self._types = Path(self._folder.name) / "types.add.xml"
+        self._types.write_text(_type_file(scenario, ego), encoding="utf-8")
+        shapely.prepare(site.crossings)
+
+    def __enter__(self) -> World:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, tb: TracebackType | None
+    ) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """End the simulation; harmless when there is none."""
+        libsumo.close()
+        self._folder.cleanup()
+
+    def reset(self, seed: int, states: Sequence[BodyState], starts: Sequence[Start]) -> Snapshot:
+        """Start afresh and wait until the ego is on the road; the testers stand where given.
+
+        Raises SimulationError with SUMO's own words when it refuses, or when the ego finds no
+        room to enter.
+        """
+        self.collisions: set[tuple[str, str]] = set()
+        self.teleports = self.emergency_stops = 0
+        self._bodies: dict[str, Body] = {}
+        self._driven: BodyState | None = None
+        self._step, self._steering = 0, 0.0
+        try:
+            libsumo.close()
+            libsumo.start(self._command(seed))
+            self._insert(states, starts)
+            ego = self._enter(states)
+        except (libsumo.TraCIException, libsumo.FatalTraCIError) as error:
+            raise SimulationError(self._complaint(error)) from error
+        self._ego = ego
+        return self._snapshot(ego, tuple(states))
+
+    def step(self, states: tuple[BodyState, ...], command: Command) -> Snapshot | None:
+        """Advance one timestep; None when the ego has left the network.
+
+        Args:
+            states: where the testers are at its end.
+            command: what the ego does during it.
+        """
+        try:
+            self._place(states)
+            self._command_ego(command)
+            libsumo.simulationStep()
+            self._collect_events()
+            ego = self._driven or self._read_ego()
+        except (libsumo.TraCIException, libsumo.FatalTraCIError) as error:
+            raise SimulationError(self._complaint(error)) from error
+        self._step += 1
+        if ego is None:
+            return None
+        if self._driven is None:
+            self._steering = self._implied_steering(ego)
+        self._ego = ego
+        return self._snapshot(ego, states)
+
+    def _command(self, seed: int) -> list[str]:
+        """The command line of SUMO."""
+        scenario, types = self.scenario, [*self.scenario.additional, self._types]
+        files = ["-n", str(scenario.net), "-a", ",".join(str(f) for f in types)]
+        if scenario.routes is not None:
+            files += ["-r", str(scenario.routes)]
+        options = [word for k, v in OPTIONS.items() for word in (f"--{k}", v)]
+        return [
+            "sumo",
+            *files,
+            *options,
+            *("--step-length", f"{self.dt:g}", "--seed", str(seed % 2**31)),
+            *("--error-log", str(self._log)),
+        ]
+
+    def _complaint(self, error: Exception) -> str:
+        """SUMO's own words, which its exception does not hold."""
+        words = self._log.read_text(encoding="utf-8", errors="replace") if (
+            self._log.is_file()
+        ) else ""
+        lines = [line.strip() for line in words.splitlines() if line.strip()]
+        said = [line for line in lines if not line.startswith("Quitting")]
+        return "SUMO: " + " ".join(dict.fromkeys(said[:4] or [str(error)]))
+
+    # Bodies in SUMO
+
+    def _insert(self, states: Sequence[BodyState], starts: Sequence[Start]) -> None:
+        """Add the ego and the testers, each at its place before the first timestep."""
+        route = self.site.route
+        libsumo.route.add("cavsumo_ego", list(route.edges))
+        speed = self.ego.depart_speed
+        libsumo.vehicle.add(
+            EGO,
+            "cavsumo_ego",
+            typeID="cavsumo_ego",
+            departLane=str(route.lane),
+            departPos=f"{route.depart_m}",
+            departSpeed="max" if speed is None else f"{speed}",
+            arrivalPos=f"{route.arrive_m}",
+        )
+        libsumo.route.add("cavsumo_tester", [route.edges[0]])
+        for state, start in zip(states, starts, strict=True):
+            if self._is_person(state):
+                edges = start.walk or route.edges
+                libsumo.person.add(state.id, edges[0], 0.0, typeID="cavsumo_person")
+                libsumo.person.appendWalkingStage(state.id, list(edges), 0.0)
+            else:
+                kind = state.body.kind.name
+                libsumo.vehicle.add(state.id, "cavsumo_tester", typeID=f"cavsumo_{kind}")
+        self._place(states)
+
+    def _enter(self, states: Sequence[BodyState]) -> BodyState:
+        """Step until the ego has entered; the testers wait meanwhile."""
+        for _ in range(max(2, round(ENTRY_S / self.dt))):
+            libsumo.simulationStep()
+            ego = self._read_ego()
+            if ego is not None:
+                for state in states:
+                    if not self._is_person(state):
+                        libsumo.vehicle.setSpeedMode(state.id, UNSAFE)
+                return ego
+            self._place(states)
+        raise SimulationError(
+            f"the ego found no room to enter edge {self.site.route.edges[0]!r} in {ENTRY_S:g} s"
+        )
+
+    def _is_person(self, state: BodyState) -> bool:
+        """Whether SUMO is shown a person; only pedestrians can be persons."""
+        return self.scenario.embodiment == "person" and state.body.kind.name == PEDESTRIAN.name
+
+    def _place(self, states: Sequence[BodyState]) -> None:
+        """Tell SUMO where the testers are; every timestep, or it moves them itself."""
+        move, set_speed = libsumo.vehicle.moveToXY, libsumo.vehicle.setSpeed
+        for state in states:
+            body, x, y, v, o = state
+            if not math.isfinite(x + y + v + o):  # SUMO hangs on an infinite angle
+                raise SimulationError(f"{body.id}: state is not finite: {x}, {y}, {v}, {o}")
+            x, y, angle = to_sumo(x, y, o, body.kind.length)
+            if self._is_person(state):
+                on_crossing = shapely.contains_xy(self.site.crossings, x, y)
+                keep = KEEP_EXACT if on_crossing else KEEP_EXACT_ANY_LANE
+                libsumo.person.moveToXY(body.id, "", x, y, angle, keep)
+            else:
+                move(body.id, "", -1, x, y, angle, KEEP_EXACT)
+                # Followers would else see a speed that SUMO infers wrongly, by up to 6 m/s.
+                set_speed(body.id, v)
+
+    def _command_ego(self, command: Command) -> None:
+        """Pass on what the ego does; None leaves it to SUMO."""
+        if command is None:
+            return
+        if self._step == 0:
+            libsumo.vehicle.setSpeedMode(EGO, UNSAFE)
+        ego, kind = self._ego, self.ego_body.kind
+        if isinstance(command, Acceleration):
+            v = min(kind.v_max, max(kind.v_min, ego.v + command.value * self.dt))
+            libsumo.vehicle.setSpeed(EGO, v)
+        elif isinstance(command, Drive):
+            state = step_floats(
+                *ego[1:], *command, kind.wheelbase, kind.v_min, kind.v_max, self.dt
+            )
+            self._driven = BodyState(self.ego_body, *state)
+            self._steering = command.steering
+            self._place([self._driven])
+
+    # What SUMO says
+
+    def _read_ego(self) -> BodyState | None:
+        """The ego as SUMO moves it; None before it entered and after it left."""
+        vehicle = libsumo.vehicle
+        if EGO not in vehicle.getIDList():
+            return None
+        x, y = vehicle.getPosition(EGO)
+        x, y, o = from_sumo(x, y, vehicle.getAngle(EGO), self.ego_body.kind.length)
+        return BodyState(self.ego_body, x, y, vehicle.getSpeed(EGO), o)
+
+    def _implied_steering(self, ego: BodyState) -> float:
+        """The steering angle that the ego's last turn implies (seed, eq. 22), within its limits.
+
+        SUMO turns a vehicle as its lane bends, also more sharply than its axles could.
+        """
+        kind, before = ego.body.kind, self._ego
+        turn = wrap(ego.o - before.o)
+        try:
+            steering = steering_for_turn(ego.v, turn, kind.wheelbase, self.dt) if turn else 0.0
+        except NoSuchAction:
+            return math.copysign(kind.steering_max, turn) if ego.v > 0 else 0.0
+        return min(kind.steering_max, max(-kind.steering_max, steering))
+
+    def _snapshot(self, ego: BodyState, states: tuple[BodyState, ...]) -> Snapshot:
+        """Everything at this moment, the background as SUMO has it."""
+        mine = {EGO, *(s.id for s in states)}
+        raw: list[RawState] = []
+        for domain in (libsumo.vehicle, libsumo.person):
+            position, angle, speed = domain.getPosition, domain.getAngle, domain.getSpeed
+            for body_id in domain.getIDList():
+                if body_id in mine:
+                    continue
+                body = self._bodies.get(body_id) or self._meet(body_id, domain)
+                x, y = position(body_id)
+                x, y, o = from_sumo(x, y, angle(body_id), body.kind.length)
+                raw.append((body, x, y, speed(body_id), o))
+        time = round(self._step * self.dt, 6)
+        return Snapshot(self._step, time, ego, self._steering, states, tuple(raw))
+
+    def _meet(self, body_id: str, domain: Any) -> Body:
+        """A background body seen for the first time."""
+        length, width = domain.getLength(body_id), domain.getWidth(body_id)
+        name = str(domain.getVehicleClass(body_id))
+        kind = Kind(name, length, width, 2 * length / 3, 0.0, math.inf, -math.inf, math.inf, 0.0)
+        self._bodies[body_id] = Body(body_id, kind)
+        return self._bodies[body_id]
+
+    def _collect_events(self) -> None:
+        """SUMO's own reports, kept beside ours and never merged."""
+        simulation = libsumo.simulation
+        for collision in simulation.getCollisions():
+            a, b = sorted((collision.collider, collision.victim))
+            self.collisions.add((a, b))
+        self.teleports += len(simulation.getStartingTeleportIDList())
+        self.emergency_stops += len(simulation.getEmergencyStoppingVehiclesIDList())
+
+
+def _type_file(scenario: Scenario, ego: Ego) -> str:
+    """An additional file with the vehicle types of the ego and of the tester's bodies."""
+    types = [("vType", "cavsumo_ego", {"vClass": "passenger"} | ego.vtype())]
+    for kind in KINDS.values():
+        seen = scenario.sumo_width if kind is PEDESTRIAN else kind.width
+        shape = {"length": f"{kind.length}", "width": f"{seen}", "minGap": "0"}
+        shape |= {"guiShape": "passenger" if kind is CAR else kind.name}
+        types.append(("vType", f"cavsumo_{kind.name}", {"vClass": "passenger"} | shape))
+        if kind is PEDESTRIAN:
+            types.append(("vType", "cavsumo_person", {"vClass": "pedestrian"} | shape))
+    rows = [
+        f"  <{tag} id={quoteattr(name)} "
+        + " ".join(f"{k}={quoteattr(v)}" for k, v in attributes.items())
+        + "/>"
+        for tag, name, attributes in types
+    ]
+    return "\n".join(["<additional>", *rows, "</additional>", ""])
