@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -32,6 +32,7 @@ class Kind:
         v_min, v_max: speed limits [m/s].
         throttle_min, throttle_max: limits of the throttle, an acceleration [m/s2].
         steering_max: largest steering angle to either side [rad].
+        reach: no point of the box is farther from its centre [m].
     """
 
     name: str
@@ -43,6 +44,10 @@ class Kind:
     throttle_min: float
     throttle_max: float
     steering_max: float
+    reach: float = field(init=False)
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "reach", math.hypot(self.length, self.width) / 2)
 
 
 PEDESTRIAN = Kind(

@@ -12,8 +12,6 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from rich.console import Console
-
 from cavsumo import __version__
 from cavsumo.agents import AGENTS
 from cavsumo.assertions import ASSERTIONS
@@ -44,7 +42,7 @@ def run(settings: Mapping[str, Any], output: Path, quiet: bool, exit_zero: bool)
         writer = ResultsWriter(output, manifest(plan, site))
         rows, status = _play(plan, worker, writer, quiet)
     if not quiet:
-        summarise(rows, output, writer.traces, Console(soft_wrap=True))
+        summarise(rows, output, writer.traces)
     return status or exit_status(rows, exit_zero)
 
 

@@ -7,13 +7,14 @@ on the true boxes. Background bodies among themselves are left to SUMO's own rep
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from typing import NamedTuple
 
 from cavsumo.geometry import gap, overlap
-from cavsumo.snapshot import BodyState, Snapshot
+from cavsumo.snapshot import BodyState, RawState, Snapshot
 
-# No body is longer than 30 m, so centres farther apart than this on one axis cannot touch.
-REACH_M = 32.0
+
+KEPT = 64  # candidates for the smallest gap before they are weeded
 
 
 class Contact(NamedTuple):
@@ -34,77 +35,86 @@ class ContactMonitor:
 
     Attributes:
         ego_pairs, tester_pairs: the pairs that touched so far, with the ego and without it.
-        min_gap: smallest gap between the ego and a tester so far [m].
     """
 
     def __init__(self) -> None:
         self.ego_pairs: set[tuple[str, str]] = set()
         self.tester_pairs: set[tuple[str, str]] = set()
-        self.min_gap = math.inf
         self._touching: set[tuple[str, str]] = set()
+        # Where the smallest gap may have been: with its lower bound, those below any upper bound.
+        self._close: list[tuple[float, BodyState, BodyState]] = []
+        self._upper = math.inf
+
+    @property
+    def min_gap(self) -> float:
+        """Smallest gap between the ego and a tester so far [m]; infinite without testers."""
+        smallest = math.inf
+        for lower, ego, tester in self._close:
+            if lower < smallest:
+                smallest = min(smallest, gap(ego.box, tester.box))
+        return smallest
 
     def observe(self, snapshot: Snapshot) -> list[Contact]:
         """The contacts that begin in this snapshot; one that lasts is reported once."""
-        near = _near(snapshot)
-        pairs = self._ego_contacts(snapshot, near) + _tester_contacts(snapshot, near)
-        touching = {(a.id, b.id) for a, b in pairs}
+        pairs = [*self._meetings_with_ego(snapshot), *_meetings_of_testers(snapshot)]
+        if not pairs and not self._touching:
+            return []
         begun = [
             Contact(snapshot.time, a, b) for a, b in pairs if (a.id, b.id) not in self._touching
         ]
-        self._touching = touching
+        self._touching = {(a.id, b.id) for a, b in pairs}
         for contact in begun:
-            with_ego = contact.a is snapshot.ego
-            pair = (contact.a.id, contact.b.id)
-            (self.ego_pairs if with_ego else self.tester_pairs).add(pair)
+            involved = self.ego_pairs if contact.a is snapshot.ego else self.tester_pairs
+            involved.add((contact.a.id, contact.b.id))
         return begun
 
-    def _ego_contacts(
-        self, snapshot: Snapshot, near: list[BodyState]
-    ) -> list[tuple[BodyState, BodyState]]:
+    def _meetings_with_ego(self, snapshot: Snapshot) -> Iterator[tuple[BodyState, BodyState]]:
         """The bodies that touch the ego; keeps the smallest gap to a tester."""
         ego = snapshot.ego
-        box, touching = ego.box, []
         for tester in snapshot.testers:
-            # The gap is at least the distance of the centres less half the boxes' sides.
             distance = math.hypot(tester.x - ego.x, tester.y - ego.y)
-            kind = tester.body.kind
-            bound = distance - (box.length + box.width + kind.length + kind.width) / 2
-            if bound < self.min_gap or bound <= 0.0:
-                between = gap(box, tester.box)
-                self.min_gap = min(self.min_gap, between)
-                if between == 0.0:
-                    touching.append((ego, tester))
-        touching += [(ego, body) for body in near if overlap(box, body.box)]
-        return touching
+            if distance < self._upper + ego.body.kind.reach + tester.body.kind.reach:
+                self._note(distance, ego, tester)
+                if overlap(ego.box, tester.box):
+                    yield ego, tester
+        for body in _touching(ego, snapshot.raw_background):
+            yield ego, body
 
 
-def _near(snapshot: Snapshot) -> list[BodyState]:
-    """The background bodies that the ego or a tester could touch."""
-    centres = [(b.x, b.y) for b in (snapshot.ego, *snapshot.testers)]
-    return [
-        BodyState(*raw)
-        for raw in snapshot.raw_background
-        if any(abs(raw[1] - x) < REACH_M and abs(raw[2] - y) < REACH_M for x, y in centres)
-    ]
+    def _note(self, distance: float, ego: BodyState, tester: BodyState) -> None:
+        """Remember two bodies that may be the closest so far; exact gaps are dear.
+
+        The gap lies between the centres' distance less the boxes' reaches and the same less
+        their inner radii, so most timesteps are ruled out by a later, closer one.
+        """
+        a, b = ego.body.kind, tester.body.kind
+        inner = (min(a.length, a.width) + min(b.length, b.width)) / 2
+        self._upper = min(self._upper, max(0.0, distance - inner))
+        self._close.append((distance - a.reach - b.reach, ego, tester))
+        if len(self._close) > KEPT:
+            self._close = [c for c in self._close if c[0] <= self._upper]
 
 
-def _tester_contacts(
-    snapshot: Snapshot, near: list[BodyState]
-) -> list[tuple[BodyState, BodyState]]:
+def _meetings_of_testers(snapshot: Snapshot) -> Iterator[tuple[BodyState, BodyState]]:
     """Testers touching each other or the background."""
     testers = snapshot.testers
-    if len(testers) == 1 and not near:
-        return []
-    boxes = [t.box for t in testers]
-    found = [
-        (testers[i], testers[j])
-        for i in range(len(testers))
-        for j in range(i + 1, len(testers))
-        if overlap(boxes[i], boxes[j])
-    ]
-    return found + [
-        (tester, body)
-        for tester, box in zip(testers, boxes, strict=True)
-        for body in near
-        if overlap(box, body.box)
+    for i, tester in enumerate(testers):
+        for other in testers[i + 1 :]:
+            if overlap(tester.box, other.box):
+                yield tester, other
+        for body in _touching(tester, snapshot.raw_background):
+            yield tester, body
+
+
+def _touching(one: BodyState, others: tuple[RawState, ...]) -> list[BodyState]:
+    """Those among the others whose boxes touch one body's."""
+    body, x, y, _, _ = one
+    reach = body.kind.reach
+    return [
+        state
+        for other in others
+        # Centres farther apart than both reaches cannot touch; most are, so no box is made.
+        if (dx := other[1] - x) * dx + (dy := other[2] - y) * dy
+        <= (far := reach + other[0].kind.reach) * far
+        and overlap(one.box, (state := BodyState(*other)).box)
     ]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import Any
 
 from cavsumo.errors import NetworkError
@@ -75,7 +76,6 @@ class _Movement:
     out: Any
     node: Any
     direction: str
-    yields: bool
 
 
 def _movements(node: Any) -> list[_Movement]:
@@ -86,9 +86,8 @@ def _movements(node: Any) -> list[_Movement]:
             for link in lane.getOutgoing():
                 out, direction = link.getTo(), str(link.getDirection())
                 if direction not in BACK and driving_lanes(out):
-                    yields = link.getState() in YIELDING
                     found.setdefault(
-                        (into.getID(), out.getID()), _Movement(into, out, node, direction, yields)
+                        (into.getID(), out.getID()), _Movement(into, out, node, direction)
                     )
     return list(found.values())
 
@@ -96,17 +95,26 @@ def _movements(node: Any) -> list[_Movement]:
 def _worth(movement: _Movement, crossed: set[str]) -> tuple[Any, ...]:
     """Sort key: the best movement to test first."""
     into, out = movement.into, movement.out
-    approach = sum(e.getLength() for e in _upstream(into))
+    before = _upstream(into)
+    approach = sum(e.getLength() for e in before)
     return (
         movement.direction != STRAIGHT,
         -sum(e.getID() in crossed for e in (into, out)),
         -sum(any(is_pavement(lane) for lane in e.getLanes()) for e in (into, out)),
-        movement.yields,
+        _yields([*before, out]),
         -min(approach, APPROACH_M) // 20,
         -min(out.getLength(), EXIT_M) // 20,
         -len(movement.node.getIncoming()),
         str(into.getID()),
         str(out.getID()),
+    )
+
+
+def _yields(edges: Sequence[Any]) -> int:
+    """How many times a car on these edges has to give way."""
+    return sum(
+        all(link.getState() in YIELDING for link in into.getOutgoing().get(out, []))
+        for into, out in pairwise(edges)
     )
 
 

@@ -45,18 +45,19 @@ class Path:
         first, last = 0, len(self._segments)
         if near is not None:
             first, last = max(0, near - 2), min(last, near + 4)
-        best = Projection(0.0, math.inf, 0)
-        best_distance = math.inf
+        found, along, nearest = first, 0.0, math.inf
         for i in range(first, last):
             x0, y0, ux, uy, length = self._segments[i]
             dx, dy = x - x0, y - y0
-            t = min(length, max(0.0, dx * ux + dy * uy))
-            distance = math.hypot(dx - t * ux, dy - t * uy)
-            if distance < best_distance:
-                best_distance = distance
-                side = math.copysign(distance, ux * dy - uy * dx)
-                best = Projection(self._starts[i] + t, side, i)
-        return best
+            t = dx * ux + dy * uy
+            t = 0.0 if t < 0.0 else length if t > length else t
+            ex, ey = dx - t * ux, dy - t * uy
+            square = ex * ex + ey * ey
+            if square < nearest:
+                found, along, nearest = i, t, square
+        x0, y0, ux, uy, _ = self._segments[found]
+        side = math.copysign(math.sqrt(nearest), ux * (y - y0) - uy * (x - x0))
+        return Projection(self._starts[found] + along, side, found)
 
     def at(self, along: float) -> tuple[float, float, float]:
         """Point and heading (x, y, o) at an arc length; prolonged straight beyond the ends."""

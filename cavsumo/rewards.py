@@ -29,15 +29,16 @@ class Ledger:
         self.cost = self.total = 0.0
         self._dt, self._roads, self._teams = scene.dt, scene.roads, teams
         self._over = False
-        # Whether a body is on the carriageway, and until which step that cannot change: it has
-        # to walk to the next edge first.
-        self._known = [(False, -1)] * len(scene.bodies)
+        # Whether a body is on the carriageway, and how far it may still walk before that can
+        # change; asking the map is dear, so it is asked no earlier.
+        self._on_road = [False] * len(scene.bodies)
+        self._leeway = [0.0] * len(scene.bodies)
 
     def rewards(
         self, successor: Snapshot, judgements: Sequence[Judgement]
     ) -> tuple[list[float], bool] | None:
         """Each agent's reward for a timestep and whether the game ends; None once it is over."""
-        on_road = [self._is_on_road(i, b, successor.step) for i, b in enumerate(successor.testers)]
+        on_road = [self._is_on_road(i, b) for i, b in enumerate(successor.testers)]
         self.cost += self._dt * sum(on_road)
         if self._over:
             return None
@@ -60,12 +61,10 @@ class Ledger:
         self.total += sum(rewards)
         return rewards, True
 
-    def _is_on_road(self, i: int, body: BodyState, step: int) -> bool:
+    def _is_on_road(self, i: int, body: BodyState) -> bool:
         """Whether a body's centre is on the carriageway."""
-        on_road, until = self._known[i]
-        if self._roads is not None and step >= until:
-            on_road = self._roads.contains(body.x, body.y)
-            walked = body.body.kind.v_max * self._dt
-            safe = int(self._roads.edge_distance(body.x, body.y) / walked)
-            self._known[i] = on_road, step + max(1, safe)
-        return on_road
+        self._leeway[i] -= body.body.kind.v_max * self._dt if body.v > 0.0 else 0.0
+        if self._roads is not None and self._leeway[i] <= 0.0:
+            self._on_road[i] = self._roads.contains(body.x, body.y)
+            self._leeway[i] = max(1e-3, self._roads.edge_distance(body.x, body.y))
+        return self._on_road[i]

@@ -76,7 +76,9 @@ class Roads:
         self.carriageway = carriageway
         self.lanes = list(lanes)
         self._index = shapely.STRtree(self.lanes)
+        self._boundary = carriageway.boundary
         shapely.prepare(self.carriageway)
+        shapely.prepare(self._boundary)
 
     def __reduce__(self) -> tuple[type[Roads], tuple[shapely.Geometry, list[LineString]]]:
         return Roads, (self.carriageway, self.lanes)
@@ -87,7 +89,7 @@ class Roads:
 
     def edge_distance(self, x: float, y: float) -> float:
         """Distance to the nearest edge of a carriageway [m]."""
-        return float(self.carriageway.boundary.distance(Point(x, y)))
+        return float(shapely.distance(self._boundary, Point(x, y)))
 
     def crossing(self, x: float, y: float) -> Crossing | None:
         """The way straight across the nearest road from a point, or None where there is none."""

@@ -15,6 +15,7 @@ from cavsumo.assertions.base import HELD, UNFAIR, VIOLATED
 from cavsumo.outcomes import is_failure
 from cavsumo.statistics import Rate, rate
 
+WIDTH = 120  # a table cut off at the edge of a narrow terminal would hide figures
 Rows = Sequence[Mapping[str, Any]]
 
 
@@ -38,8 +39,9 @@ def failure_rate(rows: Rows) -> Rate:
     return rate(sum(map(is_failure, rows)), sum(map(is_test, rows)))
 
 
-def summarise(rows: Rows, csv_file: Path, traces: int, console: Console) -> None:
-    """Print the summary of a batch."""
+def summarise(rows: Rows, csv_file: Path, traces: int) -> None:
+    """Print the summary of a batch on stdout."""
+    console = Console(width=WIDTH)
     console.print(_table(rows), highlight=False)
     tests, failures = sum(map(is_test, rows)), sum(map(is_failure, rows))
     files = f"{csv_file}, {csv_file.with_suffix('.json')}"

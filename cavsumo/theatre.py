@@ -59,8 +59,9 @@ class Theatre:
             )
             row = _row(self.plan, job, episode)
             memory = _recall(agents)
-        except CavsumoError as error:
-            return failed(self.plan, job, str(error), time.perf_counter() - begun), job.memory
+        except Exception as error:  # whatever it is, it costs this row and no other
+            said = str(error) if isinstance(error, CavsumoError) else f"defect: {error!r}"
+            return failed(self.plan, job, said, time.perf_counter() - begun), job.memory
         row["wall_s"] = time.perf_counter() - begun
         return Outcome(row, self._kept(job, episode)), memory
 

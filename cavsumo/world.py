@@ -34,9 +34,13 @@ from cavsumo.site import Site
 from cavsumo.snapshot import BodyState, RawState, Snapshot
 
 EGO = "ego"
+RADIANS = math.pi / 180.0
 ENTRY_S = 30.0  # how long the ego may wait for room to enter the network
 KEEP_EXACT = 2  # moveToXY: exactly there, on the network or off it
 KEEP_EXACT_ANY_LANE = 6  # the same for persons, on lanes for cars too
+# moveToXY looks for lanes within this distance only; SUMO's default of 100 m costs ten times as
+# much per call for a body off the road, and no lane is wider than twice this.
+MATCH_M = 5.0
 UNSAFE = 0  # setSpeedMode: no check of SUMO's own interferes with what was commanded
 
 
@@ -116,7 +120,7 @@ class World:
             self._command_ego(command)
             libsumo.simulationStep()
             self._collect_events()
-            ego = self._driven or self._read_ego()
+            ego = self._read_ego() if self._driven is None else self._driven
         except (libsumo.TraCIException, libsumo.FatalTraCIError) as error:
             raise SimulationError(self._complaint(error)) from error
         self._step += 1
@@ -208,9 +212,9 @@ class World:
             if self._is_person(state):
                 on_crossing = shapely.contains_xy(self.site.crossings, x, y)
                 keep = KEEP_EXACT if on_crossing else KEEP_EXACT_ANY_LANE
-                libsumo.person.moveToXY(body.id, "", x, y, angle, keep)
+                libsumo.person.moveToXY(body.id, "", x, y, angle, keep, MATCH_M)
             else:
-                move(body.id, "", -1, x, y, angle, KEEP_EXACT)
+                move(body.id, "", -1, x, y, angle, KEEP_EXACT, MATCH_M)
                 # Followers would else see a speed that SUMO infers wrongly, by up to 6 m/s.
                 set_speed(body.id, v)
 
@@ -237,7 +241,8 @@ class World:
     def _read_ego(self) -> BodyState | None:
         """The ego as SUMO moves it; None before it entered and after it left."""
         vehicle = libsumo.vehicle
-        if EGO not in vehicle.getIDList():
+        self._vehicles = vehicle.getIDList()
+        if EGO not in self._vehicles:
             return None
         x, y = vehicle.getPosition(EGO)
         x, y, o = from_sumo(x, y, vehicle.getAngle(EGO), self.ego_body.kind.length)
@@ -258,17 +263,25 @@ class World:
 
     def _snapshot(self, ego: BodyState, states: tuple[BodyState, ...]) -> Snapshot:
         """Everything at this moment, the background as SUMO has it."""
-        mine = {EGO, *(s.id for s in states)}
+        mine = {EGO, *(s.body.id for s in states)}
         raw: list[RawState] = []
-        for domain in (libsumo.vehicle, libsumo.person):
+        known, cos, sin = self._bodies, math.cos, math.sin
+        if self._driven is not None:
+            self._vehicles = libsumo.vehicle.getIDList()
+        persons = libsumo.person.getIDList()
+        for domain, ids in ((libsumo.vehicle, self._vehicles), (libsumo.person, persons)):
             position, angle, speed = domain.getPosition, domain.getAngle, domain.getSpeed
-            for body_id in domain.getIDList():
+            for body_id in ids:
                 if body_id in mine:
                     continue
-                body = self._bodies.get(body_id) or self._meet(body_id, domain)
+                body = known.get(body_id) or self._meet(body_id, domain)
+                # from_sumo, written out: this is the innermost loop of every timestep
                 x, y = position(body_id)
-                x, y, o = from_sumo(x, y, angle(body_id), body.kind.length)
-                raw.append((body, x, y, speed(body_id), o))
+                o = (90.0 - angle(body_id)) * RADIANS
+                if o <= -math.pi:
+                    o += 2 * math.pi
+                half = body.kind.length / 2
+                raw.append((body, x - half * cos(o), y - half * sin(o), speed(body_id), o))
         time = round(self._step * self.dt, 6)
         return Snapshot(self._step, time, ego, self._steering, states, tuple(raw))
 

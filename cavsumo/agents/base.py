@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any, ClassVar
 
 import numpy as np
@@ -34,6 +34,17 @@ class Scene:
     bodies: tuple[Body, ...]
     starts: tuple[Start, ...]
     roads: Roads | None = None
+    _progress: list[Any] = field(default_factory=lambda: [None, None], repr=False)
+
+    def ego_progress(self, snapshot: Snapshot) -> float:
+        """How far the ego's centre is along its path [m]; computed once for each snapshot."""
+        last, here = self._progress
+        if last is not snapshot:
+            near = None if here is None else here.segment
+            here = self.ego_path.project(snapshot.ego.x, snapshot.ego.y, near)
+            self._progress[:] = snapshot, here
+        along: float = here.along
+        return along
 
 
 class Agent:

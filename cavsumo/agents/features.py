@@ -41,7 +41,6 @@ class Features:
         start = scene.starts[index]
         self.way = scene.roads.crossing(start.x, start.y) if scene.roads else None
         self.across = self.way.heading if self.way else start.o
-        self.segment: int | None = None
 
     def values(self, snapshot: Snapshot, target: int) -> list[float]:
         """The features of choosing a target now."""
@@ -68,8 +67,7 @@ class Features:
         if meeting is None:
             return -1.0, 0.0, 0.0
         ego, kind = snapshot.ego, state.body.kind
-        here = self.scene.ego_path.project(ego.x, ego.y, self.segment)
-        self.segment = here.segment
-        ahead = meeting[1] - kind.width / 2 - here.along - ego.body.kind.length / 2
+        front = self.scene.ego_progress(snapshot) + ego.body.kind.length / 2
+        ahead = meeting[1] - kind.width / 2 - front
         beside = max(0.0, meeting[0] - ego.body.kind.width / 2 - kind.length / 2)
         return ahead, beside, ahead - ego.v * time_to_walk(kind, state.v, beside)

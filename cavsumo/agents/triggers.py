@@ -56,12 +56,11 @@ class Timing:
     """
 
     def __init__(self, scene: Scene, index: int, aim: float) -> None:
-        self.path, self.aim, self.dt = scene.ego_path, aim, scene.dt
+        self.scene, self.aim = scene, aim
         self.ego_half = scene.ego.kind.length / 2
-        self.segment: int | None = None
         start, kind = scene.starts[index], scene.bodies[index].kind
         self.way = scene.roads.crossing(start.x, start.y) if scene.roads else None
-        meeting = self.path.meet(start.x, start.y, self.way.heading) if self.way else None
+        meeting = scene.ego_path.meet(start.x, start.y, self.way.heading) if self.way else None
         self.meeting = None if meeting is None else meeting[1]
         # How far along its way the body's front touches the strip that the ego sweeps.
         reach = meeting[0] if meeting else 0.0
@@ -79,13 +78,11 @@ class Timing:
         if self.way is None or self.meeting is None:
             return None
         ego = snapshot.ego
-        here = self.path.project(ego.x, ego.y, self.segment)
-        self.segment = here.segment
-        front = here.along + self.ego_half
+        front = self.scene.ego_progress(snapshot) + self.ego_half
         kind = state.body.kind
         left = self.strip - self.way.progress(state.x, state.y)
         entry = time_to_walk(kind, state.v, left + detour(kind, state.o, self.way.heading))
-        return self.meeting - kind.width / 2 - front - ego.v * (entry + self.dt)
+        return self.meeting - kind.width / 2 - front - ego.v * (entry + self.scene.dt)
 
 
 def time_to_walk(kind: Kind, v: float, distance: float) -> float:

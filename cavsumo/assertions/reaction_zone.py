@@ -70,18 +70,7 @@ class ReactionZoneAssertion(Assertion):
         ego = snapshot.ego
         if ego.v <= STANDING_MPS:
             return
-        entered = [
-            (zone_entered(
-                tester.box,
-                ego.box,
-                ego.v,
-                max_decel=self.max_decel,
-                reaction_time=self.reaction_time,
-                steering=snapshot.ego_steering,
-                wheelbase=ego.body.kind.wheelbase,
-            ), i)
-            for i, tester in enumerate(snapshot.testers)
-        ]
+        entered = [(self._zone(snapshot, tester), i) for i, tester in enumerate(snapshot.testers)]
         early = [i for zone, i in entered if zone in ("body", "braking")]
         fair = [i for zone, i in entered if zone == "reaction"]
         if early:
@@ -90,6 +79,19 @@ class ReactionZoneAssertion(Assertion):
         elif fair:
             self._enter(snapshot, fair[0], HELD)
             self.pending, self._body = True, fair[0]
+
+    def _zone(self, snapshot: Snapshot, tester: BodyState) -> str | None:
+        """The zone that a body touches."""
+        ego = snapshot.ego
+        return zone_entered(
+            tester.box,
+            ego.box,
+            ego.v,
+            max_decel=self.max_decel,
+            reaction_time=self.reaction_time,
+            steering=snapshot.ego_steering,
+            wheelbase=ego.body.kind.wheelbase,
+        )
 
     def _enter(self, snapshot: Snapshot, body: int, verdict: str) -> None:
         """Record who entered a zone, and when."""

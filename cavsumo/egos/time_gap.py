@@ -52,7 +52,7 @@ class TimeGapEgo(Ego):
         self.margin_m = number("margin_m", margin_m, 0.0, 10.0)
 
     def reset(self, scene: Scene) -> None:
-        self.path = scene.ego_path
+        self.scene, self.path = scene, scene.ego_path
 
     def act(self, snapshot: Snapshot) -> Command:
         v = snapshot.ego.v
@@ -66,7 +66,7 @@ class TimeGapEgo(Ego):
     def _obstacles(self, snapshot: Snapshot) -> Iterator[tuple[float, float]]:
         """(gap, speed along the path) of each body ahead in the strip [m, m/s]."""
         ego = snapshot.ego
-        front = self.path.project(ego.x, ego.y).along + ego.body.kind.length / 2
+        front = self.scene.ego_progress(snapshot) + ego.body.kind.length / 2
         for body in (*snapshot.testers, *snapshot.background):
             if abs(body.x - ego.x) > SIGHT_M or abs(body.y - ego.y) > SIGHT_M:
                 continue
