@@ -44,8 +44,10 @@ def main() -> None:
     with Theatre(plan, prepare(plan)) as theatre:
         full, bare, steps = compare(theatre, options.episodes)
         shares = parts(theatre, options.episodes)
-    print(f"{plan.scenario.name}, {options.agent}, {options.testers} testers, "
-          f"{options.episodes} episodes, {steps} steps")
+    print(
+        f"{plan.scenario.name}, {options.agent}, {options.testers} testers, "
+        f"{options.episodes} episodes, {steps} steps"
+    )
     print(f"bare libsumo  {options.episodes / bare:7.1f} episodes/s  {steps / bare:8.0f} steps/s")
     print(f"cavsumo       {options.episodes / full:7.1f} episodes/s  {steps / full:8.0f} steps/s")
     print(f"ratio         {bare / full:7.3f}")

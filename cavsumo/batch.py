@@ -19,10 +19,10 @@ from types import TracebackType
 from typing import Any
 
 from cavsumo.errors import CavsumoError, InputError
+from cavsumo.jobs import Job, failed, job
 from cavsumo.outcomes import Outcome
 from cavsumo.scenario import BatchPlan
 from cavsumo.site import Site
-from cavsumo.jobs import Job, failed, job
 
 STARTUP_S = 120.0  # imports and SUMO's first start, on a slow machine
 CONTEXT = multiprocessing.get_context("spawn")
@@ -38,7 +38,7 @@ def run_batch(plan: BatchPlan, worker: Worker) -> Iterator[tuple[Outcome, Any]]:
     for run in range(plan.runs * len(plan.agents)):
         name = plan.agents[run % len(plan.agents)]
         outcome, memories[name] = worker.play(job(plan, run, memories.get(name)))
-        yield outcome, memories
+        yield outcome, memories[name]
 
 
 class Worker:
@@ -52,12 +52,15 @@ class Worker:
         self._process: Any = None
 
     def __enter__(self) -> Worker:
-        self._log = tempfile.NamedTemporaryFile(prefix="cavsumo-worker-", suffix=".log")  # noqa: SIM115
+        self._log = tempfile.NamedTemporaryFile(prefix="cavsumo-worker-", suffix=".log")
         self._start()
         return self
 
     def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, tb: TracebackType | None
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        tb: TracebackType | None,
     ) -> None:
         self._stop()
         self._log.close()

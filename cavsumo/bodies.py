@@ -162,7 +162,9 @@ def model_of(teams: Mapping[str, Sequence[Body]]) -> AgentBodyEffectorModel:
         agents=tuple(teams),
         body_agent={body.id: agent for agent, body in bodies},
         effector_body={effector(b, name): b for b, names in limits.items() for name in names},
-        actions={effector(b, n): limit for b, names in limits.items() for n, limit in names.items()},
+        actions={
+            effector(b, n): limit for b, names in limits.items() for n, limit in names.items()
+        },
     )
 
 
@@ -178,7 +180,9 @@ def _surjection(
             raise UnknownName(f"image of {x!r} among the {codomain}", y, targets)
     bare = sorted(targets - set(mapping.values()))
     if bare:
-        raise InputError(f"no {domain} for {', '.join(bare)}: {domain} -> {codomain} is no surjection")
+        raise InputError(
+            f"no {domain} for {', '.join(bare)}: {domain} -> {codomain} is no surjection"
+        )
 
 
 def _inverse_image(

@@ -9,9 +9,13 @@ from pathlib import Path
 from typing import Any, NoReturn
 
 from cavsumo import __version__
-from cavsumo.errors import CavsumoError, InputError
+from cavsumo.errors import CavsumoError, Exit, InputError
 
-OK, VIOLATIONS, USAGE, NOT_RUN, INTERRUPTED = 0, 1, 2, 3, 130
+# Settings that the command line takes over as they are.
+PLAIN = (
+    "net routes ego junction agents runs seed end step_length testers kind bodies_per_agent "
+    "embodiment sumo_width start_speed trace assertions"
+).split()
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -22,11 +26,11 @@ def main(argv: Sequence[str] | None = None) -> int:
         return status
     except CavsumoError as error:
         print(f"cavsumo: {error}", file=sys.stderr)
-        return USAGE
+        return Exit.USAGE
     except BrokenPipeError:
-        return OK
+        return Exit.OK
     except KeyboardInterrupt:
-        return INTERRUPTED
+        return Exit.INTERRUPTED
 
 
 class _Parser(argparse.ArgumentParser):
@@ -112,8 +116,12 @@ def _add_testers(group: Any) -> None:
     add = group.add_argument
     add("--agent", dest="agents", action="append", metavar="NAME", help="repeat to compare")
     add("--testers", type=int, metavar="N", help="number of tester bodies (default 3)")
-    add("--param", action="append", metavar="KEY=VALUE", help="parameter of the agents that "
-        "have it; AGENT.KEY=VALUE for one of them")
+    add(
+        "--param",
+        action="append",
+        metavar="KEY=VALUE",
+        help="parameter of the agents that have it; AGENT.KEY=VALUE for one of them",
+    )
     add("--kind", help="kind of body (default pedestrian)")
     add("--bodies-per-agent", type=int, metavar="N", help="default 1")
     add("--embodiment", choices=("vehicle", "person"), help="what SUMO is shown")
@@ -149,7 +157,7 @@ def _list(options: argparse.Namespace) -> int:
     from cavsumo.listings import listing
 
     print(listing(options.sort, options.name))
-    return OK
+    return Exit.OK
 
 
 def _settings(options: argparse.Namespace) -> dict[str, Any]:
@@ -157,10 +165,7 @@ def _settings(options: argparse.Namespace) -> dict[str, Any]:
     from cavsumo.scenario import read_config
 
     settings = read_config(Path(options.config)) if options.config else {}
-    plain = ("net", "routes", "ego", "junction", "agents", "runs", "seed", "end", "step_length")
-    plain += ("testers", "kind", "bodies_per_agent", "embodiment", "sumo_width", "start_speed")
-    plain += ("trace", "assertions")
-    given = {key: getattr(options, key) for key in plain}
+    given = {key: getattr(options, key) for key in PLAIN}
     given["deadline_s"] = options.deadline
     given["ego_route"] = options.ego_route and options.ego_route.replace(",", " ").split()
     given["additional"] = options.additional_files and options.additional_files.split(",")

@@ -17,9 +17,8 @@ from cavsumo.agents import AGENTS
 from cavsumo.assertions import ASSERTIONS
 from cavsumo.batch import Worker, run_batch
 from cavsumo.bodies import kind_named
-from cavsumo.cli import INTERRUPTED, NOT_RUN, OK, VIOLATIONS
 from cavsumo.egos import make_ego
-from cavsumo.errors import InputError
+from cavsumo.errors import Exit, InputError
 from cavsumo.jobs import check_agents, job, make_agents
 from cavsumo.options import OPTIONS
 from cavsumo.outcomes import Outcome, ResultsWriter, Row, is_failure
@@ -64,18 +63,19 @@ def _play(
 ) -> tuple[list[Row], int]:
     """Play the batch and write it; an interrupt keeps what ran."""
     rows: list[Row] = []
-    memories: dict[str, Any] = {}
-    status, word = OK, "finished"
+    learned: dict[str, Any] = {}
+    status, word = Exit.OK, "finished"
     with Progress(plan.runs * len(plan.agents), quiet) as progress:
         try:
-            for outcome, memories in run_batch(plan, worker):
+            for outcome, memory in run_batch(plan, worker):
                 rows.append(writer.write(outcome))
+                if memory is not None:
+                    learned[outcome.row["agent"]] = memory
                 progress.update(rows[-1])
         except KeyboardInterrupt:
-            status, word = INTERRUPTED, "interrupted"
+            status, word = Exit.INTERRUPTED, "interrupted"
         finally:
             counts = Counter(row["outcome"] for row in rows)
-            learned = {name: memory for name, memory in memories.items() if memory is not None}
             writer.finish(word, {"episodes": len(rows), "counts": counts, "learned": learned})
     return rows, status
 
@@ -83,8 +83,8 @@ def _play(
 def exit_status(rows: list[Row], exit_zero: bool) -> int:
     """0 all well, 1 the ego violated an assertion, 3 an episode could not be run."""
     if any(row["outcome"] == "error" for row in rows):
-        return NOT_RUN
-    return VIOLATIONS if any(map(is_failure, rows)) and not exit_zero else OK
+        return Exit.NOT_RUN
+    return Exit.VIOLATED if any(map(is_failure, rows)) and not exit_zero else Exit.OK
 
 
 def manifest(plan: BatchPlan, site: Site) -> dict[str, Any]:
@@ -130,10 +130,10 @@ def replay(results: Path, run_number: int) -> int:
     difference = first_difference(row, frames, again.row, again.frames)
     if difference is not None:
         print(f"run {run_number}: diverged: {difference}")
-        return VIOLATIONS
+        return Exit.VIOLATED
     compared = f"{len(frames)} frames" if frames is not None else "its row (no trace was kept)"
     print(f"run {run_number} ({row['agent']}): {row['outcome']}, {compared}: the same")
-    return OK
+    return Exit.OK
 
 
 def replayed(plan: BatchPlan, site: Site, run_number: int) -> Outcome:

@@ -13,7 +13,6 @@ from typing import NamedTuple
 from cavsumo.geometry import gap, overlap
 from cavsumo.snapshot import BodyState, RawState, Snapshot
 
-
 KEPT = 64  # candidates for the smallest gap before they are weeded
 
 
@@ -79,7 +78,6 @@ class ContactMonitor:
                     yield ego, tester
         for body in _touching(ego, snapshot.raw_background):
             yield ego, body
-
 
     def _note(self, distance: float, ego: BodyState, tester: BodyState) -> None:
         """Remember two bodies that may be the closest so far; exact gaps are dear.

@@ -17,6 +17,17 @@ from __future__ import annotations
 
 import difflib
 from collections.abc import Iterable
+from enum import IntEnum
+
+
+class Exit(IntEnum):
+    """Exit statuses of the command line, pytest's where they mean the same."""
+
+    OK = 0  # every episode ran and the ego violated nothing
+    VIOLATED = 1  # it violated an assertion at least once
+    USAGE = 2  # the command line or an input file is wrong
+    NOT_RUN = 3  # an episode could not be run
+    INTERRUPTED = 130  # interrupted; what ran is in the results
 
 
 class CavsumoError(Exception):

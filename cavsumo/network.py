@@ -128,7 +128,9 @@ def pavement_walk(edge: Any) -> tuple[str, ...]:
     A person whose walk leads on through a junction survives ``moveToXY`` there; one whose walk
     ends with its edge crashes SUMO.
     """
-    back = {e.getID() for e in edge.getToNode().getOutgoing() if e.getToNode() is edge.getFromNode()}
+    back = {
+        e.getID() for e in edge.getToNode().getOutgoing() if e.getToNode() is edge.getFromNode()
+    }
     onward = sorted(
         (e.getID() in back, str(e.getID()))
         for e in edge.getToNode().getOutgoing()

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from bisect import bisect_right
 from collections.abc import Iterable
+from itertools import pairwise
 from typing import NamedTuple
 
 Point = tuple[float, float]
@@ -31,7 +32,7 @@ class Path:
         self.points: tuple[Point, ...] = tuple(kept)
         self._starts = [0.0]
         self._segments: list[tuple[float, float, float, float, float]] = []
-        for (x0, y0), (x1, y1) in zip(kept, kept[1:], strict=False):
+        for (x0, y0), (x1, y1) in pairwise(kept):
             length = math.dist((x0, y0), (x1, y1))
             self._segments.append((x0, y0, (x1 - x0) / length, (y1 - y0) / length, length))
             self._starts.append(self._starts[-1] + length)
@@ -83,7 +84,5 @@ class Path:
 
     def cut(self, start: float, end: float) -> Path:
         """The part between two arc lengths, 0 <= start < end <= length."""
-        inner = [
-            p for p, s in zip(self.points, self._starts, strict=True) if start < s < end
-        ]
+        inner = [p for p, s in zip(self.points, self._starts, strict=True) if start < s < end]
         return Path([self.at(start)[:2], *inner, self.at(end)[:2]])

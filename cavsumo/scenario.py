@@ -36,7 +36,9 @@ class Scenario(BaseModel):
     kind: str = Field("pedestrian", description="kind of the tester bodies")
     bodies_per_agent: int = Field(1, ge=1, description="bodies that one agent owns")
     start_speed: Finite | None = Field(
-        None, ge=0, description="speed of the testers at the start [m/s]; their maximum if not given"
+        None,
+        ge=0,
+        description="speed of the testers at the start [m/s]; their maximum if not given",
     )
     embodiment: Literal["vehicle", "person"] = Field(
         "vehicle", description="how SUMO is shown a tester pedestrian"

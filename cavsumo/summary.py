@@ -48,8 +48,7 @@ def summarise(rows: Rows, csv_file: Path, traces: int) -> None:
     if traces:
         files += f", {csv_file.with_suffix('')}/ ({traces} traces)"
     said = (
-        f"\n{tests} tests in {len(rows)} episodes, {failures} of them failed by the ego."
-        f"  {files}"
+        f"\n{tests} tests in {len(rows)} episodes, {failures} of them failed by the ego.  {files}"
     )
     _say(console, said)
     errors = [r for r in rows if r["outcome"] == "error"]

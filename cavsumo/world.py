@@ -78,7 +78,10 @@ class World:
         return self
 
     def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, tb: TracebackType | None
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        tb: TracebackType | None,
     ) -> None:
         self.close()
 
@@ -148,9 +151,9 @@ class World:
 
     def _complaint(self, error: Exception) -> str:
         """SUMO's own words, which its exception does not hold."""
-        words = self._log.read_text(encoding="utf-8", errors="replace") if (
-            self._log.is_file()
-        ) else ""
+        words = (
+            self._log.read_text(encoding="utf-8", errors="replace") if (self._log.is_file()) else ""
+        )
         lines = [line.strip() for line in words.splitlines() if line.strip()]
         said = [line for line in lines if not line.startswith("Quitting")]
         return "SUMO: " + " ".join(dict.fromkeys(said[:4] or [str(error)]))
@@ -229,9 +232,7 @@ class World:
             v = min(kind.v_max, max(kind.v_min, ego.v + command.value * self.dt))
             libsumo.vehicle.setSpeed(EGO, v)
         elif isinstance(command, Drive):
-            state = step_floats(
-                *ego[1:], *command, kind.wheelbase, kind.v_min, kind.v_max, self.dt
-            )
+            state = step_floats(*ego[1:], *command, kind.wheelbase, kind.v_min, kind.v_max, self.dt)
             self._driven = BodyState(self.ego_body, *state)
             self._steering = command.steering
             self._place([self._driven])

@@ -58,9 +58,7 @@ class ElectionAgent(ProgrammedAgent):
 
     def crossing_bodies(self) -> list[int]:
         """The owned bodies that are crossing."""
-        return [
-            j for j, walk in zip(self.owned, self.crossings, strict=True) if walk.active
-        ]
+        return [j for j, walk in zip(self.owned, self.crossings, strict=True) if walk.active]
 
 
 class Coordinator:

@@ -66,9 +66,8 @@ class ProgrammedAgent(Agent):
 
     def _choose(self, i: int, snapshot: Snapshot, state: BodyState) -> Action:
         crossing = self.crossings[i]
-        if not crossing.active and self.starts(i, snapshot, state):
-            if crossing.begin(state):
-                self._idles[i] = DoNothing()  # beyond the road nothing of the start holds
+        if not crossing.active and self.starts(i, snapshot, state) and crossing.begin(state):
+            self._idles[i] = DoNothing()  # beyond the road nothing of the start holds
         return crossing.action(state) if crossing.active else self._idles[i].action(state)
 
 

@@ -61,7 +61,10 @@ class QLearningAgent(Agent):
         self.episodes = 0
 
     def recall(self) -> Any:
-        return {"weights": dict(zip(FEATURES, self.weights, strict=True)), "episodes": self.episodes}
+        return {
+            "weights": dict(zip(FEATURES, self.weights, strict=True)),
+            "episodes": self.episodes,
+        }
 
     def remember(self, memory: Any) -> None:
         self.weights = [float(memory["weights"][name]) for name in FEATURES]

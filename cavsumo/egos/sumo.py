@@ -60,12 +60,11 @@ class SumoEgo(Ego):
                 raise UnknownName("attribute of a SUMO vType", name, VTYPE_ATTRIBUTES, "ego sumo")
             if isinstance(value, float) and not math.isfinite(value):
                 raise InputError(f"ego sumo: {name} must be finite, got {value}")
-        size = {
-            name: number(name, attributes.pop(name), 0.1, 30.0)
-            for name in ("length", "width")
-            if name in attributes
-        }
-        self.kind = dataclasses.replace(EGO_KIND, **size)
+        self.kind = dataclasses.replace(
+            EGO_KIND,
+            length=number("length", attributes.pop("length", EGO_KIND.length), 0.1, 30.0),
+            width=number("width", attributes.pop("width", EGO_KIND.width), 0.1, 5.0),
+        )
         delay = number("actionStepLength", actionStepLength, 0.0, 10.0)
         self.attributes = {"carFollowModel": carFollowModel, **attributes}
         if delay:
