@@ -13,6 +13,7 @@ from typing import NamedTuple
 from cavsumo.geometry import gap, overlap
 from cavsumo.snapshot import BodyState, RawState, Snapshot
 
+FAR = 40.0  # m; twice the reach of the longest vehicle, so that most are ruled out by one number
 KEPT = 64  # candidates for the smallest gap before they are weeded
 
 
@@ -107,12 +108,13 @@ def _meetings_of_testers(snapshot: Snapshot) -> Iterator[tuple[BodyState, BodySt
 def _touching(one: BodyState, others: tuple[RawState, ...]) -> list[BodyState]:
     """Those among the others whose boxes touch one body's."""
     body, x, y, _, _ = one
-    reach = body.kind.reach
-    return [
-        state
-        for other in others
-        # Centres farther apart than both reaches cannot touch; most are, so no box is made.
-        if (dx := other[1] - x) * dx + (dy := other[2] - y) * dy
-        <= (far := reach + other[0].kind.reach) * far
-        and overlap(one.box, (state := BodyState(*other)).box)
+    left, right = x - FAR, x + FAR
+    near = [other for other in others if left < other[1] < right and abs(other[2] - y) < FAR]
+    if not near:
+        return []
+    states = [
+        BodyState(*other)
+        for other in near
+        if math.hypot(other[1] - x, other[2] - y) <= body.kind.reach + other[0].kind.reach
     ]
+    return [state for state in states if overlap(one.box, state.box)]

@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from cavsumo.agents.base import Scene
-from cavsumo.assertions.base import UNFAIR, Judgement
+from cavsumo.assertions.base import Judgement
 from cavsumo.snapshot import BodyState, Snapshot
 
 GOAL = 100.0
@@ -38,17 +38,21 @@ class Ledger:
         self, successor: Snapshot, judgements: Sequence[Judgement]
     ) -> tuple[list[float], bool] | None:
         """Each agent's reward for a timestep and whether the game ends; None once it is over."""
-        on_road = [self._is_on_road(i, b) for i, b in enumerate(successor.testers)]
+        testers = successor.testers
+        on_road = [self._is_on_road(i, body) for i, body in enumerate(testers)]
         self.cost += self._dt * sum(on_road)
         if self._over:
             return None
-        winners = {j.tester for j in judgements if j.triggered and j.tester}
-        self._over = bool(winners) or any(j.verdict == UNFAIR for j in judgements)
         rewards = [
-            GOAL * any(successor.testers[i].id in winners for i in team)
-            - self._dt * (TIME_COST + ROAD_COST * sum(on_road[i] for i in team))
+            -self._dt * (TIME_COST + ROAD_COST * sum([on_road[i] for i in team]))
             for team in self._teams
         ]
+        for judgement in judgements:
+            if judgement.tester:  # somebody reached the goal, or spoilt it
+                self._over = True
+                for a, team in enumerate(self._teams):
+                    if judgement.triggered and judgement.tester in (testers[i].id for i in team):
+                        rewards[a] += GOAL
         self.total += sum(rewards)
         return rewards, self._over
 

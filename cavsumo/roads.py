@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import shapely
 from shapely.geometry import LineString, Point
@@ -37,10 +37,16 @@ class Crossing:
     enter: float
     leave: float
     length: float
+    _cos: float = field(init=False, repr=False)
+    _sin: float = field(init=False, repr=False)
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "_cos", math.cos(self.heading))
+        object.__setattr__(self, "_sin", math.sin(self.heading))
 
     def progress(self, x: float, y: float) -> float:
         """How far along the way a point is [m]."""
-        return (x - self.x) * math.cos(self.heading) + (y - self.y) * math.sin(self.heading)
+        return (x - self.x) * self._cos + (y - self.y) * self._sin
 
 
 @dataclass(frozen=True, slots=True)

@@ -207,12 +207,13 @@ class World:
     def _place(self, states: Sequence[BodyState]) -> None:
         """Tell SUMO where the testers are; every timestep, or it moves them itself."""
         move, set_speed = libsumo.vehicle.moveToXY, libsumo.vehicle.setSpeed
+        persons = self.scenario.embodiment == "person"
         for state in states:
             body, x, y, v, o = state
             if not math.isfinite(x + y + v + o):  # SUMO hangs on an infinite angle
                 raise SimulationError(f"{body.id}: state is not finite: {x}, {y}, {v}, {o}")
             x, y, angle = to_sumo(x, y, o, body.kind.length)
-            if self._is_person(state):
+            if persons and self._is_person(state):
                 on_crossing = shapely.contains_xy(self.site.crossings, x, y)
                 keep = KEEP_EXACT if on_crossing else KEEP_EXACT_ANY_LANE
                 libsumo.person.moveToXY(body.id, "", x, y, angle, keep, MATCH_M)

@@ -128,13 +128,13 @@ class TimingAgent(ProgrammedReactiveAgent):
     """Algorithm 4, triggered by time: step in as the ego's reaction zone arrives (the default)."""
 
     PARAMETERS: ClassVar[Mapping[str, str]] = {
-        "aim": "part of the reaction zone to step into, (0..1]: 1 its far end, 0 its near end",
+        "aim": "part of the reaction zone to step into, [0.2..1]: 1 its far end, 0 its near end",
         "idle": IDLE_DOC,
     }
 
     def __init__(self, aim: float = 0.5, idle: str = "kerb") -> None:
         super().__init__(idle)
-        self.aim = number("aim", aim, 0.01, 1.0)
+        self.aim = number("aim", aim, 0.2, 1.0)
 
     def trigger(self, scene: Scene, index: int) -> Trigger:
         return Timing(scene, index, self.aim)

@@ -9,10 +9,13 @@ from cavsumo.agents.base import Scene
 from cavsumo.bodies import Kind
 from cavsumo.geometry import stopping_distances
 from cavsumo.kinematics import wrap
+from cavsumo.roads import Crossing
 from cavsumo.snapshot import BodyState, Snapshot
 
 # The zones that the timing trigger aims at: CAV-Gym's, as in the reaction-zone assertion.
 MAX_DECEL, REACTION_TIME = 9.0, 0.675  # m/s2, s
+# The near end of the reaction zone is avoided by this share of it: the walk is only estimated.
+MARGIN = 0.1
 
 
 class Trigger(Protocol):
@@ -48,7 +51,7 @@ class Timing:
     The ego is expected to keep its speed. The body enters the strip that the ego sweeps after
     t_e seconds; the gap from the ego's front to the body is then
     ``gap = distance - v_ego * t_e``, and the step is timed when d_b < gap <= d_b + aim * d_r,
-    with d_b and d_r the lengths of the braking and the reaction zone.
+    with d_b and d_r the lengths of the braking and the reaction zone (and a margin to d_b).
 
     Args:
         aim: how far into the reaction zone to wait, in (0, 1]: 1 steps in as its far end arrives,
@@ -62,16 +65,19 @@ class Timing:
         self.way = scene.roads.crossing(start.x, start.y) if scene.roads else None
         meeting = scene.ego_path.meet(start.x, start.y, self.way.heading) if self.way else None
         self.meeting = None if meeting is None else meeting[1]
+        self._last: tuple[BodyState, float] | None = None
         # How far along its way the body's front touches the strip that the ego sweeps.
         reach = meeting[0] if meeting else 0.0
         self.strip = reach - scene.ego.kind.width / 2 - kind.length / 2
 
     def __call__(self, snapshot: Snapshot, state: BodyState) -> bool:
         gap = self.gap_at_entry(snapshot, state)
+        if gap is None or gap <= 0.0:
+            return False
         braking, reaction = stopping_distances(
             snapshot.ego.v, max_decel=MAX_DECEL, reaction_time=REACTION_TIME
         )
-        return gap is not None and braking < gap <= braking + self.aim * reaction
+        return braking + MARGIN * reaction < gap <= braking + self.aim * reaction
 
     def gap_at_entry(self, snapshot: Snapshot, state: BodyState) -> float | None:
         """Distance from the ego's front to the body as it enters the ego's strip [m]."""
@@ -79,10 +85,17 @@ class Timing:
             return None
         ego = snapshot.ego
         front = self.scene.ego_progress(snapshot) + self.ego_half
-        kind = state.body.kind
-        left = self.strip - self.way.progress(state.x, state.y)
-        entry = time_to_walk(kind, state.v, left + detour(kind, state.o, self.way.heading))
-        return self.meeting - kind.width / 2 - front - ego.v * (entry + self.scene.dt)
+        if self._last is None or self._last[0] != state:
+            self._last = state, self._time_to_enter(state, self.way)
+        entry = self._last[1]
+        return self.meeting - state.body.kind.width / 2 - front - ego.v * (entry + self.scene.dt)
+
+    def _time_to_enter(self, state: BodyState, way: Crossing) -> float:
+        """How long a body that goes now takes to the strip that the ego sweeps [s]."""
+        left = self.strip - way.progress(state.x, state.y)
+        return time_to_walk(
+            state.body.kind, state.v, left + detour(state.body.kind, state.o, way.heading)
+        )
 
 
 def time_to_walk(kind: Kind, v: float, distance: float) -> float:

@@ -127,9 +127,16 @@ class ApproachKerb:
         self.way = scene.roads.crossing(start.x, start.y) if scene.roads else None
         kind = scene.bodies[index].kind
         self.stop = (self.way.enter if self.way else 0.0) - kind.length / 2 - KERB_CLEARANCE_M
+        self._last: tuple[BodyState, Action] | None = None
 
     def action(self, state: BodyState) -> Action:
-        """The next action; a body too fast to stop at the kerb brakes before it turns there."""
+        """The next action; most of the time the body stands, and nothing has changed."""
+        if self._last is None or self._last[0] != state:
+            self._last = state, self._approach(state)
+        return self._last[1]
+
+    def _approach(self, state: BodyState) -> Action:
+        """Walk up to the kerb; a body too fast to stop there brakes before it turns."""
         kind = state.body.kind
         if self.way is None:
             return walk(state, state.o, 0.0, self.dt)

@@ -82,7 +82,12 @@ class ReactionZoneAssertion(Assertion):
 
     def _zone(self, snapshot: Snapshot, tester: BodyState) -> str | None:
         """The zone that a body touches."""
-        ego = snapshot.ego
+        ego, kind = snapshot.ego, tester.body.kind
+        # The zones end this far from the ego's centre at most, arcs included.
+        braking = 0.5 * ego.v * ego.v / self.max_decel
+        far = ego.body.kind.reach + braking + self.reaction_time * ego.v + kind.reach
+        if abs(tester.x - ego.x) > far or abs(tester.y - ego.y) > far:
+            return None
         return zone_entered(
             tester.box,
             ego.box,

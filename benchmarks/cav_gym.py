@@ -1,0 +1,170 @@
+"""cavsumo beside CAV-Gym on the straight road, and the timing tester beside what can be forced.
+
+    python benchmarks/cav_gym.py [--runs 250] [--timing-runs 1000]
+
+CAV-Gym's own figures (github.com/TSL-UOB/CAV-Gym, its pedestrians environment at 60 Hz, 250
+episodes a cell, 95 % Wilson intervals) are the ones to overlap. SUMO's clock counts milliseconds,
+so this runs at 50 Hz; epsilon 0.01 per step at 60 Hz is 0.603 per second.
+
+A start can be forced when a pedestrian, turned at full steering to some heading between 20 and 160
+degrees against the road and walking on, enters the strip that the ego sweeps before the braking
+zone arrives there. It is a grid over straight ways, not a proof for all others.
+"""
+
+from __future__ import annotations
+
+import argparse
+import math
+import tempfile
+from pathlib import Path
+
+import numpy as np
+
+from cavsumo.agents.walking import steer_to
+from cavsumo.batch import Worker, run_batch
+from cavsumo.bodies import PEDESTRIAN, Body
+from cavsumo.commands import prepare
+from cavsumo.geometry import Box, overlap, zone_entered
+from cavsumo.jobs import job
+from cavsumo.kinematics import step_floats
+from cavsumo.roads import Start
+from cavsumo.scenario import BatchPlan, plan_from
+from cavsumo.site import Site
+from cavsumo.snapshot import BodyState
+from cavsumo.starts import draw_starts
+from cavsumo.statistics import rate
+from cavsumo.summary import failure_rate, interval, percent, test_rate
+
+ROOT = Path(__file__).resolve().parent.parent
+SETTINGS = {
+    "net": str(ROOT / "networks" / "pedestrians.net.xml"),
+    "routes": "none",
+    "ego": "constant",
+    "ego_params": {"speed": 6.75},
+    "step_length": 0.02,
+    "end": 16.66,
+    "trace": "none",
+    "params": {"rate_per_s": 0.603, "election.rule": "unsigned"},
+}
+AGENTS = ("random", "programmed-random", "proximity", "election")
+# CAV-Gym: interesting % with 95 % Wilson interval, and wasted episodes of 250.
+CAV_GYM = {
+    ("random", 1): (2.0, 0.9, 4.6, 3),
+    ("programmed-random", 1): (28.0, 22.8, 33.9, 36),
+    ("proximity", 1): (30.4, 25.0, 36.4, 59),
+    ("election", 1): (30.4, 25.0, 36.4, 59),
+    ("random", 3): (10.4, 7.2, 14.8, 12),
+    ("programmed-random", 3): (45.2, 39.1, 51.4, 63),
+    ("proximity", 3): (50.4, 44.2, 56.5, 91),
+    ("election", 3): (29.6, 24.3, 35.5, 58),
+    ("random", 6): (19.6, 15.2, 25.0, 16),
+    ("programmed-random", 6): (53.6, 47.4, 59.7, 98),
+    ("proximity", 6): (54.4, 48.2, 60.5, 110),
+    ("election", 6): (20.4, 15.9, 25.8, 71),
+}
+
+
+def main() -> None:
+    """Measure and print both tables."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--runs", type=int, default=250)
+    parser.add_argument("--timing-runs", type=int, default=1000)
+    options = parser.parse_args()
+    if options.runs:
+        compare(options.runs)
+    if options.timing_runs:
+        force(options.timing_runs)
+
+
+def compare(runs: int) -> None:
+    """The four testers beside CAV-Gym's."""
+    print("tester              n   cavsumo %  [95 %]          unfair   CAV-Gym %  [95 %]     overlap")
+    for testers in (1, 3, 6):
+        rows = play(testers, AGENTS, runs)
+        for agent in AGENTS:
+            mine = [r for r in rows if r["agent"] == agent]
+            found = test_rate(mine)
+            unfair = sum(r["outcome"] == "unfair" for r in mine)
+            theirs, low, high, _ = CAV_GYM[agent, testers]
+            print(
+                f"{agent:18} {testers:2}  {percent(found.value):>8}  {interval(found):14} "
+                f"{unfair:5}/{runs}  {theirs:7.1f} %  [{low:.1f}, {high:.1f}]   "
+                f"{'yes' if found.overlaps(low / 100, high / 100) else 'NO'}"
+            )
+
+
+def force(runs: int) -> None:
+    """The timing tester beside the starts that can be forced, start by start."""
+    print("\ntiming tester       n   tests %   [95 %]         unfair  failed    forceable %   won of them")
+    for testers in (1, 3, 6):
+        count = runs if testers == 1 else runs // 2
+        plan, site = setting(testers, ("timing",), count)
+        possible = [forceable_episode(plan, site, run) for run in range(count)]
+        rows = play(testers, ("timing",), count)
+        found, failed = test_rate(rows), failure_rate(rows)
+        unfair = sum(r["outcome"] == "unfair" for r in rows)
+        won = sum(r["outcome"] in ("held", "violated") for r, p in zip(rows, possible, strict=True) if p)
+        beyond = found.count - won
+        print(
+            f"timing             {testers:2}  {percent(found.value):>8}  {interval(found):14} "
+            f"{unfair:5}   {percent(failed.value):>8}   {percent(rate(sum(possible), count).value):>8}"
+            f"     {percent(won / sum(possible))} ({beyond} won beside them), "
+            f"{found.count / sum(possible):.3f} of the bound"
+        )
+
+
+def setting(testers: int, agents: tuple[str, ...], runs: int) -> tuple[BatchPlan, Site]:
+    """The plan of a cell and its site."""
+    known = {"timing": {}, **dict.fromkeys(AGENTS, SETTINGS["params"])}
+    params = known[agents[0]]
+    plan = plan_from(
+        SETTINGS | {"testers": testers, "agents": agents, "runs": runs, "params": params}, "cav_gym"
+    )
+    return plan, prepare(plan)
+
+
+def play(testers: int, agents: tuple[str, ...], runs: int) -> list[dict[str, object]]:
+    """The rows of a cell."""
+    plan, site = setting(testers, agents, runs)
+    with Worker(plan, site) as worker, tempfile.TemporaryDirectory():
+        return [outcome.row for outcome, _ in run_batch(plan, worker)]
+
+
+def forceable_episode(plan: BatchPlan, site: Site, run: int) -> bool:
+    """Whether any of an episode's starts can be forced."""
+    seed = job(plan, run).seed
+    stream = np.random.default_rng(np.random.SeedSequence(seed).spawn(1)[0])
+    starts = draw_starts(site.areas, [PEDESTRIAN] * plan.scenario.testers, stream)
+    return any(forceable(start) for start in starts)
+
+
+def forceable(start: Start) -> bool:
+    """Whether some heading brings a pedestrian into the ego's strip in time."""
+    lane, up = -1.825, 1.0 if start.y < 0 else -1.0
+    return any(
+        in_time(start, up * math.radians(degrees), lane) for degrees in range(90, 165, 5)
+    ) or any(in_time(start, up * math.radians(degrees), lane) for degrees in range(20, 90, 5))
+
+
+def in_time(start: Start, heading: float, lane: float, v_ego: float = 6.75, dt: float = 0.02) -> bool:
+    """Walk one way until the box touches the strip; whether the braking zone is not there yet."""
+    kind, body = PEDESTRIAN, Body("walker", PEDESTRIAN)
+    strip = Box(49.5, lane, 0.0, 400.0, 1.75)
+    state = BodyState(body, start.x, start.y, kind.v_max, start.o)
+    for k in range(round(16.66 / dt)):
+        steering = steer_to(state, heading, dt)
+        moved = step_floats(
+            *state[1:], 0.0, steering, kind.wheelbase, kind.v_min, kind.v_max, dt
+        )
+        state = BodyState(body, *moved)
+        if overlap(state.box, strip):
+            ego = Box(v_ego * dt * (k + 1), lane, 0.0, 4.5, 1.75)
+            zone = zone_entered(
+                state.box, ego, v_ego, max_decel=9.0, reaction_time=0.675, wheelbase=3.0
+            )
+            return zone in (None, "reaction") and state.x > ego.x and state.x <= 99.0
+    return False
+
+
+if __name__ == "__main__":
+    main()
