@@ -65,7 +65,7 @@ class Timing:
         self.way = scene.roads.crossing(start.x, start.y) if scene.roads else None
         meeting = scene.ego_path.meet(start.x, start.y, self.way.heading) if self.way else None
         self.meeting = None if meeting is None else meeting[1]
-        self._last: tuple[BodyState, float] | None = None
+        self._last: tuple[BodyState, float | None] | None = None
         # How far along its way the body's front touches the strip that the ego sweeps.
         reach = meeting[0] if meeting else 0.0
         self.strip = reach - scene.ego.kind.width / 2 - kind.length / 2
@@ -88,11 +88,15 @@ class Timing:
         if self._last is None or self._last[0] != state:
             self._last = state, self._time_to_enter(state, self.way)
         entry = self._last[1]
+        if entry is None:
+            return None
         return self.meeting - state.body.kind.width / 2 - front - ego.v * (entry + self.scene.dt)
 
-    def _time_to_enter(self, state: BodyState, way: Crossing) -> float:
-        """How long a body that goes now takes to the strip that the ego sweeps [s]."""
+    def _time_to_enter(self, state: BodyState, way: Crossing) -> float | None:
+        """How long a body that goes now takes to the ego's strip [s]; None beyond its edge."""
         left = self.strip - way.progress(state.x, state.y)
+        if left <= 0.0:
+            return None
         return time_to_walk(
             state.body.kind, state.v, left + detour(state.body.kind, state.o, way.heading)
         )

@@ -11,7 +11,6 @@ A body that touches the braking zone or the ego first makes the episode unfair.
 from __future__ import annotations
 
 import dataclasses
-import math
 from collections.abc import Mapping, Sequence
 from typing import ClassVar
 
@@ -30,12 +29,15 @@ from cavsumo.contacts import Contact
 from cavsumo.geometry import in_frame, zone_entered
 from cavsumo.snapshot import BodyState, Snapshot
 
+BESIDE_M = 0.2  # a body this far beside the strip ahead has left the ego's way
+
 
 @ASSERTIONS.register("reaction-zone")
 class ReactionZoneAssertion(Assertion):
     """The ego hits no body it could have avoided (CAV-Gym's key assertion, the default).
 
-    Decided by contact, by the ego having passed the body, or by its standing clear of it.
+    Decided by contact, by the ego having passed the body or standing clear of it, or by the body
+    having left the ego's way; whoever comes back after that meets the ego anew.
     """
 
     name: ClassVar[str] = "reaction-zone"
@@ -123,7 +125,7 @@ class ReactionZoneAssertion(Assertion):
                 impact_speed=hit.closing_speed,
             )
             self._decide()
-        elif self._passed(ego, body) or self._stands_clear(snapshot):
+        elif self._passed(ego, body) or self._left(snapshot, body) or self._stands_clear(snapshot):
             self._decide()
 
     def _decide(self) -> None:
@@ -132,8 +134,15 @@ class ReactionZoneAssertion(Assertion):
     def _passed(self, ego: BodyState, body: BodyState) -> bool:
         """Whether the whole body lies behind the ego's rear bumper."""
         seen = in_frame(body.box, ego.x, ego.y, ego.o)
-        extent = math.hypot(seen.length, seen.width) / 2
-        return seen.x + extent < -ego.body.kind.length / 2
+        return seen.x + body.body.kind.reach < -ego.body.kind.length / 2
+
+    def _left(self, snapshot: Snapshot, body: BodyState) -> bool:
+        """Whether the body is out of the zones, beside the strip ahead and beside the path."""
+        ego = snapshot.ego
+        ahead = in_frame(body.box, ego.x, ego.y, ego.o).y
+        planned = self.scene.ego_path.project(body.x, body.y).lateral
+        room = min(abs(ahead), abs(planned)) - body.body.kind.reach - ego.body.kind.width / 2
+        return room > BESIDE_M and self._zone(snapshot, body) is None
 
     def _stands_clear(self, snapshot: Snapshot) -> bool:
         """Whether the ego has been standing for long enough."""
