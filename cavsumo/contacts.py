@@ -7,7 +7,6 @@ on the true boxes. Background bodies among themselves are left to SUMO's own rep
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
 from typing import NamedTuple
 
 from cavsumo.geometry import gap, overlap
@@ -15,6 +14,9 @@ from cavsumo.snapshot import BodyState, RawState, Snapshot
 
 FAR = 40.0  # m; twice the reach of the longest vehicle, so that most are ruled out by one number
 KEPT = 64  # candidates for the smallest gap before they are weeded
+
+
+Pair = tuple[BodyState, BodyState]
 
 
 class Contact(NamedTuple):
@@ -56,7 +58,7 @@ class ContactMonitor:
 
     def observe(self, snapshot: Snapshot) -> list[Contact]:
         """The contacts that begin in this snapshot; one that lasts is reported once."""
-        pairs = [*self._meetings_with_ego(snapshot), *_meetings_of_testers(snapshot)]
+        pairs = self._meetings_with_ego(snapshot) + _meetings_of_testers(snapshot)
         if not pairs and not self._touching:
             return []
         begun = [
@@ -68,17 +70,19 @@ class ContactMonitor:
             involved.add((contact.a.id, contact.b.id))
         return begun
 
-    def _meetings_with_ego(self, snapshot: Snapshot) -> Iterator[tuple[BodyState, BodyState]]:
+    def _meetings_with_ego(self, snapshot: Snapshot) -> list[Pair]:
         """The bodies that touch the ego; keeps the smallest gap to a tester."""
         ego = snapshot.ego
+        body, x, y, _, _ = ego
+        pairs: list[Pair] = []
         for tester in snapshot.testers:
-            distance = math.hypot(tester.x - ego.x, tester.y - ego.y)
-            if distance < self._upper + ego.body.kind.reach + tester.body.kind.reach:
+            distance = math.hypot(tester.x - x, tester.y - y)
+            reach = body.kind.reach + tester.body.kind.reach
+            if distance - reach < self._upper:
                 self._note(distance, ego, tester)
-                if overlap(ego.box, tester.box):
-                    yield ego, tester
-        for body in _touching(ego, snapshot.raw_background):
-            yield ego, body
+                if distance <= reach and overlap(ego.box, tester.box):
+                    pairs.append((ego, tester))
+        return pairs + [(ego, other) for other in _touching(ego, snapshot.raw_background)]
 
     def _note(self, distance: float, ego: BodyState, tester: BodyState) -> None:
         """Remember two bodies that may be the closest so far; exact gaps are dear.
@@ -94,15 +98,19 @@ class ContactMonitor:
             self._close = [c for c in self._close if c[0] <= self._upper]
 
 
-def _meetings_of_testers(snapshot: Snapshot) -> Iterator[tuple[BodyState, BodyState]]:
+def _meetings_of_testers(snapshot: Snapshot) -> list[Pair]:
     """Testers touching each other or the background."""
     testers = snapshot.testers
-    for i, tester in enumerate(testers):
-        for other in testers[i + 1 :]:
-            if overlap(tester.box, other.box):
-                yield tester, other
-        for body in _touching(tester, snapshot.raw_background):
-            yield tester, body
+    pairs = [(t, other) for t in testers for other in _touching(t, snapshot.raw_background)]
+    for i, tester in enumerate(testers[1:], 1):
+        x, y, reach = tester.x, tester.y, 2 * tester.body.kind.reach
+        pairs += [
+            (other, tester)
+            for other in testers[:i]
+            if abs(other.x - x) <= reach and abs(other.y - y) <= reach
+            if overlap(other.box, tester.box)
+        ]
+    return pairs
 
 
 def _touching(one: BodyState, others: tuple[RawState, ...]) -> list[BodyState]:

@@ -45,7 +45,7 @@ class Path:
         """
         first, last = 0, len(self._segments)
         if near is not None:
-            first, last = max(0, near - 2), min(last, near + 4)
+            first, last = max(0, near - 1), min(last, near + 3)
         found, along, nearest = first, 0.0, math.inf
         for i in range(first, last):
             x0, y0, ux, uy, length = self._segments[i]

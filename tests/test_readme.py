@@ -1,0 +1,55 @@
+"""The README keeps its word: its commands exist and its examples run."""
+
+from __future__ import annotations
+
+import re
+import shlex
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[1]
+README = (ROOT / "README.md").read_text(encoding="utf-8")
+COMMANDS = sorted(set(re.findall(r"cavsumo run [^`\n]*", README)))
+
+
+def cavsumo(words: list[str], folder: Path) -> subprocess.CompletedProcess[str]:
+    """The command line in a folder of its own."""
+    return subprocess.run(
+        [sys.executable, "-m", "cavsumo", *words], cwd=folder, capture_output=True, text=True
+    )
+
+
+@pytest.fixture(scope="module")
+def checkout(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder as the README's reader has it, with the files that the README shows."""
+    folder = tmp_path_factory.mktemp("checkout")
+    for name in ("networks", "routes"):
+        (folder / name).symlink_to(ROOT / name)
+    example = re.search(r"<!-- example: (\S+) -->\n```python\n(.*?)```", README, re.DOTALL)
+    scenario = re.search(r"```toml\n(.*?)```", README, re.DOTALL)
+    assert example
+    assert scenario
+    (folder / example[1]).write_text(example[2], encoding="utf-8")
+    (folder / "scenario.toml").write_text(scenario[1], encoding="utf-8")
+    (folder / "my.net.xml").symlink_to(ROOT / "networks" / "pedestrians.net.xml")
+    return folder
+
+
+@pytest.mark.parametrize("command", COMMANDS)
+def test_each_run_command_of_the_readme_runs(command: str, checkout: Path) -> None:
+    """Whatever the README tells the reader to type plays episodes."""
+    words = shlex.split(command, comments=True)[1:]
+    if "--help" not in words:
+        words += ["--runs", "1", "-o", "readme.csv"]
+    done = cavsumo(words, checkout)
+    assert done.returncode in (0, 1), done.stderr
+    assert "Traceback" not in done.stderr
+
+
+def test_the_agents_of_the_readme_are_those_that_there_are(checkout: Path) -> None:
+    """The README's table of testers names every registered agent."""
+    listed = {line.split()[0] for line in cavsumo(["agents"], checkout).stdout.splitlines()}
+    assert listed == set(re.findall(r"^\| `([a-z-]+)` \|", README, re.MULTILINE))
