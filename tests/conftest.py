@@ -1,0 +1,181 @@
+"""What the test files share: networks, plans with their sites, and scenes that need no SUMO."""
+
+from __future__ import annotations
+
+import importlib
+import math
+import sys
+from collections.abc import Callable, Iterator, Sequence
+from pathlib import Path
+from typing import Any
+
+import pytest
+from shapely.geometry import LineString, box
+
+from cavsumo.agents.base import Scene
+from cavsumo.bodies import PEDESTRIAN, Body, Kind
+from cavsumo.commands import prepare
+from cavsumo.egos import make_ego
+from cavsumo.egos.base import EGO_KIND
+from cavsumo.paths import Path as Polyline
+from cavsumo.roads import Roads, Start
+from cavsumo.scenario import BatchPlan, plan_from
+from cavsumo.site import Site
+from cavsumo.snapshot import BodyState, Snapshot
+from cavsumo.world import World
+
+ROOT = Path(__file__).parents[1]
+NAMES = ("crossing", "junction", "pedestrians")
+
+# The straight road of networks/pedestrians.net.xml, in metres.
+ROAD_LENGTH, ROAD_WIDTH, LANE_Y, PAVEMENT_Y = 99.0, 7.3, 1.825, 5.15
+
+Pose = tuple[float, float, float]  # x, y [m], o [rad]
+State = tuple[float, float, float, float]  # x, y [m], v [m/s], o [rad]
+
+
+@pytest.fixture(scope="session")
+def networks() -> dict[str, Path]:
+    """The three networks that come with cavsumo: crossing, junction, pedestrians."""
+    return {name: ROOT / "networks" / f"{name}.net.xml" for name in NAMES}
+
+
+@pytest.fixture(scope="session")
+def routes() -> dict[str, Path]:
+    """Their background demand."""
+    return {name: ROOT / "routes" / f"{name}.rou.xml" for name in NAMES}
+
+
+@pytest.fixture(scope="session")
+def staged(networks: dict[str, Path]) -> Callable[..., tuple[BatchPlan, Site]]:
+    """Call with a network's name and settings: a plan and its site, as the command line makes them.
+
+    The roads are empty unless ``routes`` is set ("auto" for the network's own demand).
+    """
+    sites: dict[tuple[Any, ...], Site] = {}
+
+    def stage(name: str = "pedestrians", **settings: Any) -> tuple[BatchPlan, Site]:
+        chosen = {"net": networks[name], "routes": "none"} | settings
+        if chosen["routes"] == "auto":
+            del chosen["routes"]
+        plan = plan_from(chosen, "test")
+        s = plan.scenario
+        key = (s.net, s.ego_route, s.junction, s.ego, repr(sorted(s.ego_params.items())))
+        if key not in sites:
+            sites[key] = prepare(plan)
+        return plan, sites[key]
+
+    return stage
+
+
+@pytest.fixture(scope="session")
+def open_world(staged: Callable[..., tuple[BatchPlan, Site]]) -> Callable[..., World]:
+    """Call like ``staged`` for a world; use it as a context manager, one at a time."""
+
+    def opened(name: str = "pedestrians", **settings: Any) -> World:
+        plan, site = staged(name, **settings)
+        scenario = plan.scenario
+        return World(scenario, site, make_ego(scenario.ego, scenario.ego_params))
+
+    return opened
+
+
+@pytest.fixture
+def controller(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Callable[..., str]]:
+    """Call with the source of a Python module: it can be imported now, by workers too.
+
+    Returns the module's name; the classes in it are egos ``name:Class``.
+    """
+    made: list[str] = []
+
+    def write(source: str, name: str = "user_controller") -> str:
+        (tmp_path / f"{name}.py").write_text(source, encoding="utf-8")
+        sys.modules.pop(name, None)
+        importlib.invalidate_caches()
+        made.append(name)
+        return name
+
+    monkeypatch.syspath_prepend(str(tmp_path))
+    yield write
+    for name in made:
+        sys.modules.pop(name, None)
+
+
+@pytest.fixture(scope="session")
+def straight_roads() -> Roads:
+    """The carriageway of the straight road: 99 m long, two lanes, 7.3 m wide, centred on y = 0."""
+    half = ROAD_WIDTH / 2
+    lanes = [
+        LineString([(0.0, -LANE_Y), (ROAD_LENGTH, -LANE_Y)]),
+        LineString([(ROAD_LENGTH, LANE_Y), (0.0, LANE_Y)]),
+    ]
+    return Roads(box(0.0, -half, ROAD_LENGTH, half), lanes)
+
+
+@pytest.fixture(scope="session")
+def straight_scene(straight_roads: Roads) -> Callable[..., Scene]:
+    """Call for a scene on the straight road, without SUMO.
+
+    ``starts`` are poses (x, y, o), one a tester; those beside the carriageway stand on the
+    pavement of their side (the southern one leads east, the northern one west). The ego means to
+    drive along y = -1.825 from x = 0 to 99. ``open_plane`` leaves the roads out.
+    """
+
+    def scene(
+        starts: Sequence[Pose] = ((60.0, -PAVEMENT_Y, 0.0),),
+        *,
+        dt: float = 0.1,
+        kind: Kind = PEDESTRIAN,
+        ego_kind: Kind = EGO_KIND,
+        open_plane: bool = False,
+    ) -> Scene:
+        return Scene(
+            dt=dt,
+            ego=Body("ego", ego_kind),
+            ego_path=Polyline([(0.0, -LANE_Y), (ROAD_LENGTH, -LANE_Y)]),
+            bodies=tuple(Body(f"tester{i}", kind) for i in range(len(starts))),
+            starts=tuple(_start(*pose, open_plane) for pose in starts),
+            roads=None if open_plane else straight_roads,
+        )
+
+    return scene
+
+
+@pytest.fixture(scope="session")
+def scene_snapshot() -> Callable[..., Snapshot]:
+    """Call for what is seen in a scene at one timestep.
+
+    The ego is ``(x, v)`` on its lane, heading east, or a whole state (x, y, v, o); the testers
+    are states (x, y, v, o) and stand at their starts when not given. ``background`` are states
+    with their bodies (body, x, y, v, o).
+    """
+
+    def snapshot(
+        scene: Scene,
+        ego: tuple[float, float] | State = (10.0, 8.0),
+        testers: Sequence[State] | None = None,
+        *,
+        step: int = 0,
+        steering: float = 0.0,
+        background: Sequence[tuple[Body, float, float, float, float]] = (),
+    ) -> Snapshot:
+        full = ego if len(ego) == 4 else (ego[0], -LANE_Y, ego[1], 0.0)
+        given = testers if testers is not None else [(s.x, s.y, 0.0, s.o) for s in scene.starts]
+        states = tuple(BodyState(b, *s) for b, s in zip(scene.bodies, given, strict=True))
+        time = round(step * scene.dt, 6)
+        driver = BodyState(scene.ego, *full)
+        return Snapshot(step, time, driver, steering, states, tuple(background))
+
+    return snapshot
+
+
+def _start(x: float, y: float, o: float, open_plane: bool) -> Start:
+    """A start on the pavement of its side, on none on the carriageway or an open plane."""
+    if open_plane or abs(y) <= ROAD_WIDTH / 2:
+        return Start(x, y, o)
+    side = math.copysign(PAVEMENT_Y, y)
+    ends = [(0.0, side), (ROAD_LENGTH, side)]
+    pavement = Polyline(ends if y < 0 else ends[::-1])
+    along = pavement.project(x, y)
+    forwards = math.cos(o - pavement.at(along.along)[2]) >= 0
+    return Start(x, y, o, pavement, along.lateral, forwards)

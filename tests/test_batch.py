@@ -1,0 +1,241 @@
+"""Batches in processes that may die: what a death costs, and that everything can be repeated."""
+
+from __future__ import annotations
+
+import multiprocessing
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from cavsumo.batch import Worker, run_batch
+from cavsumo.errors import InputError
+from cavsumo.jobs import episode_seed, job
+from cavsumo.outcomes import Outcome
+from cavsumo.scenario import BatchPlan
+from cavsumo.site import Site
+
+Staged = Callable[..., tuple[BatchPlan, Site]]
+Row = dict[str, Any]
+
+# Fails in the episode whose first tester starts at x = doom: kills its process, hangs, or raises.
+MISHAP = """
+import os, signal, time
+from cavsumo.egos import Acceleration
+
+class Mishap:
+    depart_speed = 6.0
+
+    def __init__(self, how="none", doom=1e9):
+        self.how, self.doom = how, doom
+
+    def reset(self, scene):
+        self.doomed = bool(scene.starts) and scene.starts[0].x == self.doom
+
+    def act(self, snapshot):
+        if self.doomed and snapshot.step == 5:
+            if self.how == "crash":
+                os.kill(os.getpid(), signal.SIGSEGV)
+            if self.how == "hang":
+                time.sleep(3600)
+            if self.how == "raise":
+                raise RuntimeError("lost the map")
+        return Acceleration(0.0)
+"""
+DOOMED = 2  # the episode that fails
+
+
+def played(plan: BatchPlan, site: Site) -> list[Outcome]:
+    """The outcomes of a batch in a worker of its own."""
+    with Worker(plan, site) as worker:
+        return [outcome for outcome, _ in run_batch(plan, worker)]
+
+
+def lasting(outcome: Outcome) -> Row:
+    """A row without the real time it took."""
+    return {key: value for key, value in outcome.row.items() if key != "wall_s"}
+
+
+@dataclass(frozen=True)
+class Trial:
+    """Plays the batch in which the doomed episode fails in some way, and the quiet one."""
+
+    plan: Callable[..., tuple[BatchPlan, Site]]
+    quiet: list[Row]
+    doom: float
+
+    def rows(self, how: str) -> list[Row]:
+        """The rows of the batch in which it fails."""
+        return [lasting(o) for o in played(*self.plan(how=how, doom=self.doom))]
+
+
+@pytest.fixture(scope="module")
+def trial(staged: Staged, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Trial]:
+    """The undisturbed batch, played once, and how to disturb it."""
+    folder = tmp_path_factory.mktemp("controllers")
+    (folder / "mishap_controller.py").write_text(MISHAP, encoding="utf-8")
+
+    def plan(agent: str = "random", **params: Any) -> tuple[BatchPlan, Site]:
+        return staged(
+            ego="mishap_controller:Mishap",
+            ego_params=params,
+            agents=[agent],
+            runs=5,
+            testers=2,
+            trace="all",
+            deadline_s=2.0,
+        )
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.syspath_prepend(str(folder))
+        outcomes = played(*plan())
+        start = outcomes[DOOMED].frames[0]["testers"]["tester0"][0]
+        yield Trial(plan, [lasting(o) for o in outcomes], start)
+
+
+@pytest.mark.parametrize(
+    ("how", "words"),
+    [
+        ("crash", "the simulation process died of SIGSEGV"),
+        ("hang", "no answer within 2 s, killed"),
+        ("raise", "ego mishap_controller:Mishap at 0.50 s: act raised RuntimeError: lost the map"),
+    ],
+)
+def test_an_episode_that_fails_costs_its_row_and_no_other(
+    trial: Trial, how: str, words: str
+) -> None:
+    """A crash, an endless loop, an exception: an error with its reason; the rest is as ever."""
+    rows = trial.rows(how)
+    assert rows[DOOMED]["outcome"] == "error"
+    assert words in rows[DOOMED]["error"]
+    identity = ("run", "agent", "ego", "testers", "seed")
+    assert [rows[DOOMED][k] for k in identity] == [trial.quiet[DOOMED][k] for k in identity]
+    assert rows[:DOOMED] + rows[DOOMED + 1 :] == trial.quiet[:DOOMED] + trial.quiet[DOOMED + 1 :]
+
+
+@pytest.mark.xfail(
+    strict=True, raises=OSError, reason="Worker.play lets the BrokenPipeError of send() out"
+)
+def test_a_worker_killed_between_episodes_is_replaced(staged: Staged) -> None:
+    """Whoever kills the process while it waits costs one episode at most, never the batch."""
+    plan, site = staged(agents=["random"], runs=3, testers=1)
+    quiet = [lasting(o) for o in played(plan, site)]
+    with Worker(plan, site) as worker:
+        first, _ = worker.play(job(plan, 0))
+        for process in multiprocessing.active_children():
+            process.kill()
+            process.join()
+        second, _ = worker.play(job(plan, 1))
+        third, _ = worker.play(job(plan, 2))
+    assert lasting(first) == quiet[0]
+    assert second.row["outcome"] == "error" or lasting(second) == quiet[1]
+    assert lasting(third) == quiet[2]
+
+
+def test_no_process_is_left_behind(staged: Staged) -> None:
+    """When a batch is over, so are its processes."""
+    before = set(multiprocessing.active_children())
+    with Worker(*staged()):
+        assert set(multiprocessing.active_children()) > before
+    assert set(multiprocessing.active_children()) <= before
+
+
+def test_what_sumo_refuses_comes_out_before_the_first_episode(
+    staged: Staged, tmp_path: Path
+) -> None:
+    """A route file with an unknown edge: no worker, one message, in SUMO's own words."""
+    file = tmp_path / "bad.rou.xml"
+    file.write_text('<routes><trip id="a" depart="0" from="nowhere" to="westbound"/></routes>')
+    plan, site = staged(routes=file)
+    with pytest.raises(InputError, match="'nowhere'"), Worker(plan, site):
+        pytest.fail("the worker started")
+
+
+# Repeating
+
+PAIR = {"routes": "auto", "agents": ["random", "timing"], "trace": "all"}
+
+
+@pytest.fixture(scope="module")
+def recorded(staged: Staged) -> list[Outcome]:
+    """Two episodes each of two agents on a real junction, with traffic and the default ego."""
+    return played(*staged("crossing", runs=2, **PAIR))
+
+
+def test_the_same_plan_twice_gives_the_same_rows_and_frames(
+    staged: Staged, recorded: list[Outcome]
+) -> None:
+    """In another process, with other hash seeds and addresses: only the real time differs."""
+    again = played(*staged("crossing", runs=2, **PAIR))
+    assert [lasting(o) for o in again] == [lasting(o) for o in recorded]
+    assert repr([o.frames for o in again]) == repr([o.frames for o in recorded])
+    assert all(o.row["steps"] > 0 and o.frames[-1]["background"] for o in recorded)
+
+
+def test_an_episode_is_the_same_in_any_batch_and_order(
+    staged: Staged, recorded: list[Outcome]
+) -> None:
+    """Run i stays what it is when more runs are asked for, and whatever was played before it."""
+    plan, site = staged("crossing", runs=5, **PAIR)
+    with Worker(plan, site) as worker:
+        for run in (3, 0, 2, 1):
+            outcome, _ = worker.play(job(plan, run))
+            assert lasting(outcome) == lasting(recorded[run])
+            assert repr(outcome.frames) == repr(recorded[run].frames)
+
+
+def test_agents_compared_meet_the_same_starts(recorded: list[Outcome]) -> None:
+    """Episode by episode all agents get the same seed, and so the same testers and traffic."""
+    assert [o.row["agent"] for o in recorded] == ["random", "timing"] * 2
+    for a, b in (recorded[:2], recorded[2:]):
+        assert a.row["seed"] == b.row["seed"]
+        assert repr(a.frames[0]) == repr(b.frames[0])
+        assert repr(a.frames[-1]) != repr(b.frames[-1])
+    assert recorded[0].row["seed"] == episode_seed(1, 0)
+    assert repr(recorded[0].frames[0]) != repr(recorded[2].frames[0])
+
+
+# Learning
+
+SCHOOL = {"runs": 3, "testers": 2, "trace": "none", "end": 15.0}
+
+
+@pytest.fixture(scope="module")
+def learned(staged: Staged) -> list[Any]:
+    """What two Q-learning testers know after each of three episodes in one process."""
+    plan, site = staged(agents=["q-learning"], **SCHOOL)
+    with Worker(plan, site) as worker:
+        return [memory for _, memory in run_batch(plan, worker)]
+
+
+def test_learning_goes_on_in_the_next_process(staged: Staged, learned: list[Any]) -> None:
+    """The weights are equal, whether one process played all episodes or another took over."""
+    plan, site = staged(agents=["q-learning"], **SCHOOL)
+    with Worker(plan, site) as worker:
+        outcome, memory = worker.play(job(plan, 2, learned[1]))
+    assert outcome.row["outcome"] != "error"
+    assert memory == learned[2]
+    assert [m["episodes"] for m in memory] == [3, 3]
+    assert learned[0] != learned[1] != learned[2]
+    assert any(memory[0]["weights"].values())
+
+
+def test_a_death_loses_one_episode_and_not_the_training(trial: Trial) -> None:
+    """The process dies in the third episode: the fourth goes on from what the second taught."""
+    plan, site = trial.plan("q-learning", how="crash", doom=trial.doom)
+    with Worker(plan, site) as worker:
+        memories = [memory for _, memory in run_batch(plan, worker)]
+    assert [memory[0]["episodes"] for memory in memories] == [1, 2, 2, 3, 4]
+    assert memories[DOOMED] == memories[DOOMED - 1]
+    assert memories[DOOMED + 1] != memories[DOOMED]
+
+
+def test_a_learner_learns_from_its_own_episodes_only(staged: Staged, learned: list[Any]) -> None:
+    """Beside another agent it knows as much after each of its episodes as it does alone."""
+    plan, site = staged(agents=["random", "q-learning"], **SCHOOL)
+    with Worker(plan, site) as worker:
+        memories = [memory for _, memory in run_batch(plan, worker)]
+    assert memories[1::2] == learned
+    assert memories[0::2] == [None, None, None]
