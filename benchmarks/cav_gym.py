@@ -78,7 +78,9 @@ def main() -> None:
 
 def compare(runs: int) -> None:
     """The four testers beside CAV-Gym's."""
-    print("tester              n   cavsumo %  [95 %]          unfair   CAV-Gym %  [95 %]     overlap")
+    print(
+        "tester              n   cavsumo %  [95 %]          unfair   CAV-Gym %  [95 %]     overlap"
+    )
     for testers in (1, 3, 6):
         rows = play(testers, AGENTS, runs)
         for agent in AGENTS:
@@ -95,7 +97,9 @@ def compare(runs: int) -> None:
 
 def force(runs: int) -> None:
     """The timing tester beside the starts that can be forced, start by start."""
-    print("\ntiming tester       n   tests %   [95 %]         unfair  failed    forceable %   won of them")
+    print(
+        "\ntiming tester       n   tests %   [95 %]         unfair  failed    forceable %   won of them"
+    )
     for testers in (1, 3, 6):
         count = runs if testers == 1 else runs // 2
         plan, site = setting(testers, ("timing",), count)
@@ -103,7 +107,9 @@ def force(runs: int) -> None:
         rows = play(testers, ("timing",), count)
         found, failed = test_rate(rows), failure_rate(rows)
         unfair = sum(r["outcome"] == "unfair" for r in rows)
-        won = sum(r["outcome"] in ("held", "violated") for r, p in zip(rows, possible, strict=True) if p)
+        won = sum(
+            r["outcome"] in ("held", "violated") for r, p in zip(rows, possible, strict=True) if p
+        )
         beyond = found.count - won
         print(
             f"timing             {testers:2}  {percent(found.value):>8}  {interval(found):14} "
@@ -146,16 +152,16 @@ def forceable(start: Start) -> bool:
     ) or any(in_time(start, up * math.radians(degrees), lane) for degrees in range(20, 90, 5))
 
 
-def in_time(start: Start, heading: float, lane: float, v_ego: float = 6.75, dt: float = 0.02) -> bool:
+def in_time(
+    start: Start, heading: float, lane: float, v_ego: float = 6.75, dt: float = 0.02
+) -> bool:
     """Walk one way until the box touches the strip; whether the braking zone is not there yet."""
     kind, body = PEDESTRIAN, Body("walker", PEDESTRIAN)
     strip = Box(49.5, lane, 0.0, 400.0, 1.75)
     state = BodyState(body, start.x, start.y, kind.v_max, start.o)
     for k in range(round(16.66 / dt)):
         steering = steer_to(state, heading, dt)
-        moved = step_floats(
-            *state[1:], 0.0, steering, kind.wheelbase, kind.v_min, kind.v_max, dt
-        )
+        moved = step_floats(*state[1:], 0.0, steering, kind.wheelbase, kind.v_min, kind.v_max, dt)
         state = BodyState(body, *moved)
         if overlap(state.box, strip):
             ego = Box(v_ego * dt * (k + 1), lane, 0.0, 4.5, 1.75)

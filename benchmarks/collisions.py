@@ -28,13 +28,13 @@ from typing import Any, ClassVar, NamedTuple
 
 import libsumo
 
-from cavsumo.agents.base import Scene
 from cavsumo.assertions.base import ASSERTIONS, Assertion
 from cavsumo.commands import prepare
 from cavsumo.contacts import Contact
 from cavsumo.geometry import gap, in_frame, overlap
 from cavsumo.jobs import job, make_agents
 from cavsumo.scenario import plan_from
+from cavsumo.scene import Scene
 from cavsumo.simulator import play
 from cavsumo.snapshot import BodyState, Snapshot
 from cavsumo.theatre import Theatre
@@ -51,22 +51,17 @@ SHOWN_AS = {
 }
 SHOWN = tuple(SHOWN_AS)
 PAIRS = ("ego x tester", "ego x background", "tester x background", "tester x tester")
+VERDICTS = ("both", "ours", "SUMO")
 Pair = tuple[str, str]
 
 
 class Setup(NamedTuple):
-    """What is played; the fields are those of a scenario."""
+    """What is played."""
 
     network: str
     agent: str
     ego: str
-    embodiment: str
-    width: float
-
-    @property
-    def shown(self) -> str:
-        """How SUMO is shown the testers, in a word."""
-        return next(name for name, value in SHOWN_AS.items() if value == self[3:])
+    shown: str  # one of SHOWN_AS
 
 
 class Report(NamedTuple):
@@ -181,24 +176,23 @@ class Watch(Assertion):
         others.update(libsumo.lane.getLastStepVehicleIDs(p.lane))
         return "not neighbours" if others - {a, b} else "unexplained"
 
-    def _why_only_sumo(
-        self, a: BodyState, b: BodyState, p: Place, q: Place, report: Report
-    ) -> str:
+    def _why_only_sumo(self, a: BodyState, b: BodyState, p: Place, q: Place, report: Report) -> str:
         """Why SUMO reports two bodies that are apart."""
-        lasting = pair_of(a.id, b.id) in self._reported
         if p.person or q.person:
             return "person"
         if p.lane != q.lane:
             if p.inside and q.inside:
                 return "junction"
-            return "a step late" if lasting else "unexplained"
+            lanes = self._before.get(a.id, ""), self._before.get(b.id, "")
+            together = lanes[0] == lanes[1] != "" or all(lane.startswith(":") for lane in lanes)
+            return "a step late" if together else "unexplained"
         if p.meets(q):
             side_by_side = apart_across(a, b, p.lane, p.front)
             return "side by side" if side_by_side else "laid along the lane"
         collider, victim = (p, q) if report.collider == a.id else (q, p)
         if collider.back > victim.front:
             return "already past"
-        return "a step late" if lasting else "unexplained"
+        return "a step late" if pair_of(a.id, b.id) in self._reported else "unexplained"
 
 
 def apart_across(a: BodyState, b: BodyState, lane: str, at: float) -> bool:
@@ -266,26 +260,28 @@ def episodes(setup: Setup, count: int) -> Iterator[list[Sighting] | None]:
         process.start()
         theirs.close()
         try:
-            for run in range(run, count):
+            while run < count:
                 yield ours.recv()
+                run += 1
         except EOFError:
             process.join()
             if process.exitcode is not None and process.exitcode > 0:
                 raise SystemExit(f"{setup}: run {run} failed, see above") from None
             yield None
-        run += 1
+            run += 1
         process.join()
 
 
 def serve(pipe: Connection, setup: Setup, first: int, count: int) -> None:
     """Play the episodes of one setup from a given one on."""
+    embodiment, width = SHOWN_AS[setup.shown]
     plan = plan_from(
         {
             "net": str(ROOT / "networks" / f"{setup.network}.net.xml"),
             "agents": (setup.agent,),
             "ego": setup.ego,
-            "embodiment": setup.embodiment,
-            "sumo_width": setup.width,
+            "embodiment": embodiment,
+            "sumo_width": width,
             "assertions": (Watch.name,),
         },
         "benchmark",
@@ -341,39 +337,49 @@ class Tally:
 
 def print_pairs(tally: Tally) -> None:
     """Encounters and timesteps by sort of pair."""
-    print(f"{'':51}encounters            timesteps")
-    print(f"{'testers shown as':20}{'ego':10}{'pair':20}" + 2 * f"{'both':>6}{'ours':>6}{'SUMO':>6}  ")
+    print(f"{'':52}encounters{'':12}timesteps")
+    counted = f"{'both':>6}{'ours':>6}{'SUMO':>6}"
+    print(f"{'testers shown as':20}{'ego':10}{'pair':20}{counted}  {counted}")
     for shown, ego, pair in itertools.product(SHOWN, EGOS, PAIRS):
         counts = [
-            [table[(shown, ego, pair, verdict)] for verdict in ("both", "ours", "SUMO")]
+            [table[(shown, ego, pair, verdict)] for verdict in VERDICTS]
             for table in (tally.encounters, tally.steps)
         ]
-        cells = ["".join(f"{n:6}" for n in row) for row in counts]
-        print(f"{shown:20}{ego:10}{pair:20}{'  '.join(cells)}")
+        print(f"{shown:20}{ego:10}{pair:20}{cells_of(counts)}")
+    for shown in SHOWN:
+        counts = [
+            [sum(n for k, n in table.items() if (k[0], k[3]) == (shown, v)) for v in VERDICTS]
+            for table in (tally.encounters, tally.steps)
+        ]
+        print(f"{shown:20}{'all':10}{'all':20}{cells_of(counts)}")
+
+
+def cells_of(counts: list[list[int]]) -> str:
+    """Two groups of counts as columns."""
+    return "  ".join("".join(f"{n:6}" for n in row) for row in counts)
 
 
 def print_classes(tally: Tally) -> None:
-    """Why the two differ."""
-    title = f"{'testers shown as':20}{'only':6}{'because':24}"
-    print(f"{title}{'timesteps':>10}{'encounters':>12}{'longest':>9}{'largest gap':>13}")
-    for key in sorted(tally.classes, key=lambda k: (SHOWN.index(k[0]), k[1], k[2])):
-        shown, verdict, why = key
-        counts = tally.classes[key]
-        gaps = f"{tally.largest[key]:11.2f} m" if verdict == "SUMO" else ""
-        print(
-            f"{shown:20}{verdict:6}{why:24}{sum(counts.values()):10}{len(counts):12}"
-            f"{max(counts.values()):9}{gaps}"
-        )
+    """Why the two differ: timesteps, encounters, and the most timesteps in one of them."""
+    print(" " * 30 + "".join(f"{shown:>20}" for shown in SHOWN))
+    print(f"{'only':6}{'because':24}" + f"{'steps':>8}{'enc.':>6}{'most':>6}" * len(SHOWN))
+    for verdict, why in sorted({key[1:] for key in tally.classes}):
+        cells = ""
+        for shown in SHOWN:
+            counts = tally.classes.get((shown, verdict, why), Counter())
+            cells += f"{counts.total():8}{len(counts):6}{max(counts.values(), default=0):6}"
+        print(f"{verdict:6}{why:24}{cells}")
 
 
 def print_leads(tally: Tally) -> None:
     """How much earlier or later SUMO reports what both see."""
-    for shown, leads in tally.leads.items():
+    print(f"{'testers shown as':20}{'both':>6}  SUMO's first report, against the first touch")
+    for shown in SHOWN:
+        leads = tally.leads[shown] or [0.0]
         early, late = sum(t > 0.01 for t in leads), sum(t < -0.01 for t in leads)
         print(
-            f"{shown}: of {len(leads)} encounters that both saw, SUMO's first report came before "
-            f"the touch in {early} (up to {max(leads):.1f} s), with it in "
-            f"{len(leads) - early - late}, after it in {late} (up to {-min(leads):.1f} s)"
+            f"{shown:20}{len(leads):6}  {early} before (up to {max(leads):.1f} s), "
+            f"{len(leads) - early - late} with, {late} after (up to {max(0.0, -min(leads)):.1f} s)"
         )
 
 
@@ -392,7 +398,7 @@ def print_example(setup: Setup, run: int, sighting: Sighting) -> None:
 def main() -> None:
     """Play, count and print."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--episodes", type=int, default=20, help="of each setup (default 20)")
+    parser.add_argument("--episodes", type=int, default=15, help="of each setup (default 15)")
     parser.add_argument("--examples", action="store_true", help="print an example of each class")
     parser.add_argument(
         "--show",
@@ -403,14 +409,14 @@ def main() -> None:
     options = parser.parse_args()
     if options.show:
         network, agent, ego, shown, run = options.show
-        setup = Setup(network, agent, ego, *SHOWN_AS[shown])
+        setup = Setup(network, agent, ego, shown)
         *_, last = episodes(setup, int(run) + 1)
         for sighting in last or ():
             print_example(setup, int(run), sighting)
         return
     tally = Tally()
-    for shown, *what in itertools.product(SHOWN, NETWORKS, AGENTS, EGOS):
-        setup = Setup(*what, *SHOWN_AS[shown])
+    for what in itertools.product(NETWORKS, AGENTS, EGOS, SHOWN):
+        setup = Setup(*what)
         for run, sightings in enumerate(episodes(setup, options.episodes)):
             if sightings is None:
                 tally.died += 1

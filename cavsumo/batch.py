@@ -71,7 +71,7 @@ class Worker:
         try:
             if self._process is None:
                 self._start()
-            self._pipe.send(job)
+            self._send(job)
             answer: tuple[Outcome, Any] = self._receive(self.plan.deadline_s)
             return answer
         except _WorkerGone as gone:
@@ -95,6 +95,14 @@ class Worker:
         if refusal is not None:
             self._stop()
             raise InputError(refusal)
+
+    def _send(self, job: Job) -> None:
+        """Hand over a job; _WorkerGone when there is nobody to take it."""
+        try:
+            self._pipe.send(job)
+        except OSError:
+            self._process.join(5.0)
+            raise _WorkerGone(_end_of(self._process.exitcode)) from None
 
     def _receive(self, deadline: float) -> Any:
         """What the process sends, or _WorkerGone when it died or took too long."""

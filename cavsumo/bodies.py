@@ -121,6 +121,7 @@ class AgentBodyEffectorModel:
     actions: Mapping[str, tuple[float, float]]
 
     def __post_init__(self) -> None:
+        _once("agent", self.agents)
         _surjection("bodies", self.body_agent, "agents", self.agents)
         _surjection("effectors", self.effector_body, "bodies", self.body_agent)
         for e in self.effector_body:
@@ -151,6 +152,7 @@ class AgentBodyEffectorModel:
 def model_of(teams: Mapping[str, Sequence[Body]]) -> AgentBodyEffectorModel:
     """The model in which each agent owns the bodies given, each with throttle and steering."""
     bodies = [(agent, body) for agent, owned in teams.items() for body in owned]
+    _once("body", [body.id for _, body in bodies])
     limits = {
         body.id: {
             THROTTLE: (body.kind.throttle_min, body.kind.throttle_max),
@@ -166,6 +168,13 @@ def model_of(teams: Mapping[str, Sequence[Body]]) -> AgentBodyEffectorModel:
             effector(b, n): limit for b, names in limits.items() for n, limit in names.items()
         },
     )
+
+
+def _once(what: str, names: Sequence[str]) -> None:
+    """Refuse a name that is given twice: a function has one value."""
+    twice = sorted({name for name in names if names.count(name) > 1})
+    if twice:
+        raise InputError(f"{what} {twice[0]!r} is named twice in the agent-body-effector model")
 
 
 def _surjection(

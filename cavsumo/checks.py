@@ -27,3 +27,10 @@ def choice(name: str, value: Any, valid: tuple[str, ...]) -> str:
     if value not in valid:
         raise ValueError(f"{name} must be one of {', '.join(valid)}, got {value!r}")
     return str(value)
+
+
+def truth(name: str, value: Any) -> bool:
+    """A truth value, or ValueError saying how it is written."""
+    if not isinstance(value, bool):
+        raise ValueError(f"{name} must be true or false, got {value!r}")
+    return value

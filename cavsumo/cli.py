@@ -167,7 +167,10 @@ def _settings(options: argparse.Namespace) -> dict[str, Any]:
     settings = read_config(Path(options.config)) if options.config else {}
     given = {key: getattr(options, key) for key in PLAIN}
     given["deadline_s"] = options.deadline
-    given["ego_route"] = options.ego_route and options.ego_route.replace(",", " ").split()
+    if options.ego_route is not None:
+        given["ego_route"] = options.ego_route.replace(",", " ").split()
+        if not given["ego_route"]:
+            raise InputError(f"--ego-route: expected edges, got {options.ego_route!r}")
     given["additional"] = options.additional_files and options.additional_files.split(",")
     settings |= {key: value for key, value in given.items() if value is not None}
     for key, words in (

@@ -33,16 +33,25 @@ def run(settings: Mapping[str, Any], output: Path, quiet: bool, exit_zero: bool)
     """``cavsumo run``: everything is checked before anything is written."""
     plan = plan_from(settings, "run")
     site = prepare(plan)
-    if not output.parent.is_dir():
-        raise InputError(f"output {str(output)!r}: no such folder {str(output.parent)!r}")
-    if not quiet:
-        print(_first_line(plan, site), file=sys.stderr)
+    _check_output(output)
     with Worker(plan, site) as worker:
+        if not quiet:
+            print(_first_line(plan, site), file=sys.stderr)
         writer = ResultsWriter(output, manifest(plan, site))
         rows, status = _play(plan, worker, writer, quiet)
     if not quiet:
         summarise(rows, output, writer.traces)
     return status or exit_status(rows, exit_zero)
+
+
+def _check_output(output: Path) -> None:
+    """Refuse what cannot become a results file."""
+    if not output.parent.is_dir():
+        raise InputError(f"output {str(output)!r}: no such folder {str(output.parent)!r}")
+    if output.suffix != ".csv":
+        raise InputError(f"output {str(output)!r}: expected a name that ends in .csv")
+    if output.is_dir() or output.with_suffix("").is_file():
+        raise InputError(f"output {str(output)!r}: its place is taken")
 
 
 def prepare(plan: BatchPlan) -> Site:

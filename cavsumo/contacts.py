@@ -12,7 +12,11 @@ from typing import NamedTuple
 from cavsumo.geometry import gap, overlap
 from cavsumo.snapshot import BodyState, RawState, Snapshot
 
-FAR = 40.0  # m; twice the reach of the longest vehicle, so that most are ruled out by one number
+# Below this speed the ego stands: whoever touches it then walked into it [m/s].
+STANDING_MPS = 0.1
+# No two centres farther apart than this belong to bodies that touch: the longest vehicle that SUMO
+# knows without being told is a train of 135 m.
+FAR = 75.0
 KEPT = 64  # candidates for the smallest gap before they are weeded
 
 
@@ -20,7 +24,7 @@ Pair = tuple[BodyState, BodyState]
 
 
 class Contact(NamedTuple):
-    """Two bodies beginning to touch."""
+    """Two bodies beginning to touch, or the ego driving on into one that touched it standing."""
 
     time: float  # s
     a: BodyState  # the ego when it is involved, else a tester
@@ -43,6 +47,7 @@ class ContactMonitor:
         self.ego_pairs: set[tuple[str, str]] = set()
         self.tester_pairs: set[tuple[str, str]] = set()
         self._touching: set[tuple[str, str]] = set()
+        self._touched_standing: set[tuple[str, str]] = set()
         # Where the smallest gap may have been: with its lower bound, those below any upper bound.
         self._close: list[tuple[float, BodyState, BodyState]] = []
         self._upper = math.inf
@@ -61,10 +66,17 @@ class ContactMonitor:
         pairs = self._meetings_with_ego(snapshot) + _meetings_of_testers(snapshot)
         if not pairs and not self._touching:
             return []
+        standing = snapshot.ego.v <= STANDING_MPS
         begun = [
-            Contact(snapshot.time, a, b) for a, b in pairs if (a.id, b.id) not in self._touching
+            Contact(snapshot.time, a, b)
+            for a, b in pairs
+            if (a.id, b.id) not in self._touching
+            or (not standing and (a.id, b.id) in self._touched_standing)
         ]
         self._touching = {(a.id, b.id) for a, b in pairs}
+        self._touched_standing = {
+            pair for pair in self._touching if standing and pair[0] == snapshot.ego.id
+        }
         for contact in begun:
             involved = self.ego_pairs if contact.a is snapshot.ego else self.tester_pairs
             involved.add((contact.a.id, contact.b.id))

@@ -157,13 +157,18 @@ def _straight(connections: dict[Any, list[Any]]) -> list[Any]:
 def _through(network: Network, movement: _Movement, half_m: float) -> EgoRoute:
     """The route through a junction, cut to the approach and the exit wanted."""
     before, after = _upstream(movement.into), _downstream(movement.out)
-    approach = sum(e.getLength() for e in before)
-    depart = max(half_m, approach - APPROACH_M)
-    while len(before) > 1 and depart >= before[0].getLength() - 1.0:
-        depart = max(half_m, depart - before.pop(0).getLength())
+    while len(before) > 1 and _driven(network, before) - APPROACH_M >= before[0].getLength() - 1.0:
+        before.pop(0)
+    depart = max(half_m, _driven(network, before) - APPROACH_M)
     surplus = sum(e.getLength() for e in after) - EXIT_M
     arrive = max(1.0, float(after[-1].getLength()) - max(0.0, surplus))
     return _routed(network, [*before, *after], half_m, depart, arrive, str(movement.node.getID()))
+
+
+def _driven(network: Network, edges: Sequence[Any]) -> float:
+    """Length of the way over some edges, junction interiors included [m]; 0 when there is none."""
+    lanes = _lanes_along(network, edges)
+    return lane_path(lanes).length if lanes else 0.0
 
 
 def _routed(

@@ -99,6 +99,8 @@ class Network:
 
 def read_network(file: FilePath) -> Network:
     """Read a .net.xml or .net.xml.gz; raises NetworkError in one sentence when it is none."""
+    if file.is_dir():
+        raise NetworkError(f"network {str(file)!r}: is a folder, expected a .net.xml")
     if not file.is_file():
         raise NetworkError(f"network {str(file)!r}: no such file{_neighbours(file)}")
     _check_root(file)
@@ -134,7 +136,7 @@ def pavement_walk(edge: Any) -> tuple[str, ...]:
     onward = sorted(
         (e.getID() in back, str(e.getID()))
         for e in edge.getToNode().getOutgoing()
-        if any(is_pavement(lane) for lane in e.getLanes())
+        if e.getFunction() in ("", "connector") and any(is_pavement(lane) for lane in e.getLanes())
     )
     return (str(edge.getID()), *(edge_id for _, edge_id in onward[:1]))
 
@@ -150,7 +152,9 @@ def lane_path(lanes: Sequence[Any]) -> Path:
 
 
 def _lane_area(lane: Any) -> shapely.Geometry:
-    """The surface of a lane."""
+    """The surface of a lane; ValueError when it has none."""
+    if not float(lane.getWidth()) > 0.0:
+        raise ValueError(f"lane {lane.getID()!r} has the width {lane.getWidth()}")
     return LineString(lane_shape(lane)).buffer(
         float(lane.getWidth()) / 2, cap_style="flat", join_style="mitre"
     )

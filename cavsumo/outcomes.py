@@ -55,6 +55,7 @@ COLUMNS: Mapping[str, str] = {
 }
 Row = dict[str, Any]
 FORMAT = "cavsumo-results-1"
+FRAME_KEYS = {"step", "time_s", "ego", "steering", "testers", "background"}
 
 
 @dataclass(frozen=True)
@@ -94,6 +95,8 @@ class ResultsWriter:
     """Writes a batch: manifest first and last, rows as they come, traces beside them."""
 
     def __init__(self, csv_file: Path, manifest: Mapping[str, Any]) -> None:
+        if csv_file.suffix != ".csv":  # the manifest and the traces take the other names
+            raise ResultsError(f"results {str(csv_file)!r}: expected a name that ends in .csv")
         self.csv_file = csv_file
         self.manifest_file = csv_file.with_suffix(".json")
         self.trace_folder = csv_file.with_suffix("")
@@ -133,7 +136,8 @@ class ResultsWriter:
         """Remove the traces of an earlier batch of the same name, and nothing else."""
         if self.trace_folder.is_dir():
             for old in self.trace_folder.glob("run*.jsonl"):
-                old.unlink()
+                if old.stem.removeprefix("run").isdecimal():
+                    old.unlink()
 
     def _write_manifest(self, status: str) -> None:
         data = {"format": FORMAT, "status": status, **self.manifest, "columns": dict(COLUMNS)}
@@ -153,8 +157,12 @@ def read_trace(file: Path) -> list[dict[str, Any]]:
     """The frames of a trace."""
     try:
         lines = file.read_text(encoding="utf-8").splitlines()
-        return [json.loads(line) for line in lines[1:]]
-    except (OSError, json.JSONDecodeError) as error:
+        frames = [json.loads(line) for line in lines[1:]]
+        for found in frames:
+            if not set(found) >= FRAME_KEYS:
+                raise ValueError(f"a frame without {', '.join(sorted(FRAME_KEYS - set(found)))}")
+        return frames
+    except (OSError, ValueError, TypeError) as error:
         raise ResultsError(f"trace {str(file)!r}: cannot be read: {error}") from error
 
 

@@ -39,7 +39,7 @@ class Path:
         self.length = self._starts[-1]
 
     def project(self, x: float, y: float, near: int | None = None) -> Projection:
-        """The nearest point of the path; ``near`` limits the search to that segment's neighbours.
+        """The nearest point of the path; ``near`` names the segment to search around first.
 
         The path is not prolonged: beyond its ends ``along`` is 0 or the length.
         """
@@ -56,6 +56,8 @@ class Path:
             square = ex * ex + ey * ey
             if square < nearest:
                 found, along, nearest = i, t, square
+        if near is not None and found in (first, last - 1) and 0 < found < len(self._segments) - 1:
+            return self.project(x, y)  # at the edge of the window: it may lie beyond
         x0, y0, ux, uy, _ = self._segments[found]
         side = math.copysign(math.sqrt(nearest), ux * (y - y0) - uy * (x - x0))
         return Projection(self._starts[found] + along, side, found)
@@ -78,7 +80,11 @@ class Path:
             dx, dy = x - x0, y - y0
             distance = (dx * uy - dy * ux) / cross
             t = (dx * sin - dy * cos) / cross
-            if distance >= 0 and 0 <= t <= length and (best is None or distance < best[0]):
+            if (
+                distance >= 0
+                and -1e-9 <= t <= length + 1e-9
+                and (best is None or distance < best[0])
+            ):
                 best = distance, start + t
         return best
 

@@ -8,8 +8,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from cavsumo.agents.base import Scene
 from cavsumo.assertions.base import Judgement
+from cavsumo.scene import Scene
 from cavsumo.snapshot import BodyState, Snapshot
 
 GOAL = 100.0

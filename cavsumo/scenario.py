@@ -48,7 +48,9 @@ class Scenario(BaseModel):
     )
     end: Finite = Field(60.0, gt=0, le=36000, description="horizon of an episode [s]")
     step_length: Finite = Field(0.1, ge=0.001, le=1, description="timestep lambda [s]")
-    assertions: tuple[str, ...] = Field(("reaction-zone",), description="what the ego must keep")
+    assertions: tuple[str, ...] = Field(
+        ("reaction-zone",), min_length=1, description="what the ego must keep"
+    )
     assertion_params: Params = Field(default_factory=dict, description="their parameters")
 
     @field_validator("step_length")
@@ -100,9 +102,7 @@ def read_config(file: Path) -> dict[str, Any]:
         raise InputError(f"config {str(file)!r}: {error.strerror}") from error
     except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
         raise InputError(f"config {str(file)!r}: {error}") from error
-    for key in data:
-        if key not in SCENARIO_KEYS | PLAN_KEYS:
-            raise UnknownName("key", key, SCENARIO_KEYS | PLAN_KEYS, str(file))
+    _check_keys(data, str(file))
     return {k: _resolved(k, v, file.parent) for k, v in data.items()}
 
 
@@ -112,6 +112,7 @@ def plan_from(settings: Mapping[str, Any], source: str) -> BatchPlan:
     A route file that lies beside the network (``routes/NAME.rou.xml`` next to its folder) is
     found when none is named; ``routes = "none"`` keeps the roads empty.
     """
+    _check_keys(settings, source)
     if "net" not in settings:
         raise InputError(f"{source}: no network given; name one with --net FILE")
     scenario = {k: v for k, v in settings.items() if k in SCENARIO_KEYS}
@@ -132,6 +133,13 @@ def plan_from(settings: Mapping[str, Any], source: str) -> BatchPlan:
             f"testers {plan.scenario.testers}"
         )
     return plan
+
+
+def _check_keys(settings: Mapping[str, Any], source: str) -> None:
+    """Refuse keys that no setting has."""
+    for key in settings:
+        if key not in SCENARIO_KEYS | PLAN_KEYS:
+            raise UnknownName("key", key, SCENARIO_KEYS | PLAN_KEYS, source)
 
 
 def _route_file(net: Path, given: Any) -> Path | None:

@@ -11,7 +11,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from cavsumo.agents.base import Agent, Scene
+from cavsumo.agents.base import Agent
 from cavsumo.assertions.base import SEVERITY, Assertion, Judgement
 from cavsumo.bodies import Action, Body, Kind
 from cavsumo.contacts import ContactMonitor
@@ -20,6 +20,7 @@ from cavsumo.errors import AgentError
 from cavsumo.kinematics import step_floats
 from cavsumo.rewards import Ledger
 from cavsumo.roads import Start
+from cavsumo.scene import Scene
 from cavsumo.site import Site
 from cavsumo.snapshot import BodyState, Snapshot
 from cavsumo.starts import draw_starts

@@ -11,7 +11,8 @@ from pathlib import Path
 import shapely
 
 from cavsumo.ego_routes import EgoRoute, derived_route, given_route
-from cavsumo.network import read_network
+from cavsumo.errors import NetworkError
+from cavsumo.network import Network, read_network
 from cavsumo.roads import Roads
 from cavsumo.starts import StartingArea, starting_areas
 
@@ -43,6 +44,16 @@ def derive_site(
     Raises InputError (UnknownName, NetworkError) in one sentence.
     """
     network = read_network(net)
+    try:
+        return _derived(network, ego_route, junction, ego_length)
+    except ValueError as error:  # shapes without points, widths that are none
+        raise NetworkError(f"network {str(net)!r}: {error}") from error
+
+
+def _derived(
+    network: Network, ego_route: tuple[str, ...], junction: str | None, ego_length: float
+) -> Site:
+    """The site of a network that was read."""
     half = ego_length / 2
     route = (
         given_route(network, ego_route, half)
@@ -51,4 +62,4 @@ def derive_site(
     )
     roads = network.roads()
     areas = starting_areas(network, roads, route.path)
-    return Site(net, route, roads, areas, network.crossing_surface())
+    return Site(network.file, route, roads, areas, network.crossing_surface())

@@ -117,9 +117,8 @@ def _draw(areas: Sequence[StartingArea], kind: Kind, rng: np.random.Generator) -
     margin = math.hypot(kind.length, kind.width) / 2
     weights = np.array([(a.end - a.begin) * a.width for a in areas])
     area = areas[int(rng.choice(len(areas), p=weights / weights.sum()))]
-    low = min(max(area.begin, margin), area.pavement.length / 2)
-    high = max(min(area.end, area.pavement.length - margin), low)
-    along = float(rng.uniform(low, high))
+    low, high = max(area.begin, margin), min(area.end, area.pavement.length - margin)
+    along = float(rng.uniform(low, high)) if low < high else (area.begin + area.end) / 2
     room = max(0.0, area.width / 2 - margin)
     lateral = float(rng.uniform(-room, room))
     forwards = bool(rng.integers(2))

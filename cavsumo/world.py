@@ -13,7 +13,9 @@ Each process has one simulation: libsumo knows no second one.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+import os
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from types import TracebackType
@@ -69,7 +71,7 @@ class World:
         self.dt = scenario.step_length
         self.ego_body = Body(EGO, ego.kind)
         self._folder = TemporaryDirectory(prefix="cavsumo-")
-        self._log = Path(self._folder.name) / "errors.log"
+        self._heard = (Path(self._folder.name) / "stderr.log").open("ab")
         self._types = Path(self._folder.name) / "types.add.xml"
         self._types.write_text(_type_file(scenario, ego), encoding="utf-8")
         shapely.prepare(site.crossings)
@@ -88,6 +90,7 @@ class World:
     def close(self) -> None:
         """End the simulation; harmless when there is none."""
         libsumo.close()
+        self._heard.close()
         self._folder.cleanup()
 
     def reset(self, seed: int, states: Sequence[BodyState], starts: Sequence[Start]) -> Snapshot:
@@ -101,13 +104,11 @@ class World:
         self._bodies: dict[str, Body] = {}
         self._driven: BodyState | None = None
         self._step, self._steering = 0, 0.0
-        try:
+        with self._listening():
             libsumo.close()
             libsumo.start(self._command(seed))
             self._insert(states, starts)
             ego = self._enter(states)
-        except (libsumo.TraCIException, libsumo.FatalTraCIError) as error:
-            raise SimulationError(self._complaint(error)) from error
         self._ego = ego
         return self._snapshot(ego, tuple(states))
 
@@ -125,7 +126,7 @@ class World:
             self._collect_events()
             ego = self._read_ego() if self._driven is None else self._driven
         except (libsumo.TraCIException, libsumo.FatalTraCIError) as error:
-            raise SimulationError(self._complaint(error)) from error
+            raise SimulationError(f"SUMO: {error}") from error
         self._step += 1
         if ego is None:
             return None
@@ -146,17 +147,24 @@ class World:
             *files,
             *options,
             *("--step-length", f"{self.dt:g}", "--seed", str(seed % 2**31)),
-            *("--error-log", str(self._log)),
         ]
 
-    def _complaint(self, error: Exception) -> str:
-        """SUMO's own words, which its exception does not hold."""
-        words = (
-            self._log.read_text(encoding="utf-8", errors="replace") if (self._log.is_file()) else ""
-        )
-        lines = [line.strip() for line in words.splitlines() if line.strip()]
-        said = [line for line in lines if not line.startswith("Quitting")]
-        return "SUMO: " + " ".join(dict.fromkeys(said[:4] or [str(error)]))
+    @contextmanager
+    def _listening(self) -> Iterator[None]:
+        """Turn what SUMO refuses into SimulationError with the words that it prints on stderr."""
+        self._heard.truncate(0)
+        stderr = os.dup(2)
+        os.dup2(self._heard.fileno(), 2)
+        try:
+            yield
+        except (libsumo.TraCIException, libsumo.FatalTraCIError) as error:
+            words = Path(self._heard.name).read_text(errors="replace") or str(error)
+            lines = [" ".join(line.split()) for line in words.splitlines()]
+            said = [line for line in lines if line and not line.startswith("Quitting")]
+            raise SimulationError("SUMO: " + " ".join(dict.fromkeys(said[:4]))) from error
+        finally:
+            os.dup2(stderr, 2)
+            os.close(stderr)
 
     # Bodies in SUMO
 

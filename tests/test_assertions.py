@@ -256,7 +256,6 @@ def test_who_walks_into_an_ego_that_stopped_for_him_is_no_failure() -> None:
     assert assertion.decided
 
 
-@pytest.mark.xfail(strict=True, reason="a contact that began while the ego stood is forgotten")
 def test_an_ego_that_then_drives_into_him_fails() -> None:
     """Leaning on a standing ego does not make one fair game for it when it drives off."""
     begin = [(at(0.0), [person(REACTION)])]

@@ -115,9 +115,6 @@ def test_an_episode_that_fails_costs_its_row_and_no_other(
     assert rows[:DOOMED] + rows[DOOMED + 1 :] == trial.quiet[:DOOMED] + trial.quiet[DOOMED + 1 :]
 
 
-@pytest.mark.xfail(
-    strict=True, raises=OSError, reason="Worker.play lets the BrokenPipeError of send() out"
-)
 def test_a_worker_killed_between_episodes_is_replaced(staged: Staged) -> None:
     """Whoever kills the process while it waits costs one episode at most, never the batch."""
     plan, site = staged(agents=["random"], runs=3, testers=1)

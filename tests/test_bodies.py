@@ -95,7 +95,6 @@ def test_a_model_without_agents_is_refused() -> None:
         AgentBodyEffectorModel((), {}, {}, {})
 
 
-@pytest.mark.xfail(strict=True, reason="model_of lets the last owner win without a word")
 def test_a_body_with_two_owners_is_refused() -> None:
     """A body obeys one agent: handing it to two is a mistake, not a change of owner."""
     shared = Body("p0", PEDESTRIAN)

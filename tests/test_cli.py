@@ -173,7 +173,6 @@ def test_listings(town: Path, words: str, said: list[str]) -> None:
         assert word in done.stdout
 
 
-@pytest.mark.xfail(strict=True, reason="a manifest holds the weights, and is refused as weights")
 def test_the_weights_of_one_batch_begin_the_next(town: Path) -> None:
     """A learner goes on with what an earlier batch wrote, as its parameter promises."""
     words = "run -n town.net.xml -r none --agent q-learning --runs 1 -e 3 --exit-zero -q".split()
@@ -211,7 +210,6 @@ REFUSED = [
     pytest.param(
         f"{ROAD} -r cut.rou.xml",
         "cut.rou.xml",
-        marks=pytest.mark.xfail(strict=True, reason="SUMO's words come in several lines"),
     ),
     ("run -c nowhere.toml", "nowhere.toml"),
     ("run -c broken.toml", "line 2"),
@@ -219,13 +217,11 @@ REFUSED = [
     pytest.param(
         "run -c aimless.toml",
         "assertions",
-        marks=pytest.mark.xfail(strict=True, reason="every episode then ends as a defect"),
     ),
     (f"{ROAD} -o nowhere/results.csv", "no such folder 'nowhere'"),
     pytest.param(
         f"{ROAD} -o taken",
         "taken",
-        marks=pytest.mark.xfail(strict=True, reason="the manifest is written before the rows fail"),
     ),
     (f"{ROAD} --trase all", "--trase"),
     ("agents timming", "did you mean 'timing'?"),

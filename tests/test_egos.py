@@ -145,7 +145,6 @@ def test_the_time_gap_ego_stops_for_a_body_in_its_path(open_world: Opener) -> No
     assert min(b - a for a, b in pairwise(late)) > -0.1 * 4.5
 
 
-@pytest.mark.xfail(strict=True, reason="it enters at SUMO's speed, 14.1 m/s, and brakes at 9 m/s2")
 def test_the_time_gap_ego_is_calm_on_an_empty_road(open_world: Opener) -> None:
     """With nobody there it never brakes harder than it finds comfortable, 3 m/s2."""
     with open_world(ego="time-gap") as world:

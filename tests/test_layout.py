@@ -17,8 +17,8 @@ PACKAGE = Path(cavsumo.__file__).parent
 # From the ground up: a module uses only what stands before it, lazily or not.
 ORDER = """
     cavsumo errors checks registry kinematics geometry paths bodies snapshot roads
-    network ego_routes starts site
-    agents.base agents.triggers agents.walking agents.random agents.features
+    network ego_routes starts site scene
+    agents.base agents.walking agents.triggers agents.random agents.features
     agents.programmed agents.election agents.qlearning agents
     contacts
     assertions.base assertions.collision assertions.reaction_zone assertions

@@ -217,12 +217,9 @@ def test_the_traces_of_an_earlier_batch_go(tmp_path: Path) -> None:
     assert [f.name for f in (tmp_path / "r").iterdir()] == ["run000000.jsonl"]
 
 
-GREEDY = pytest.mark.xfail(strict=True, reason="run*.jsonl matches more than our own traces")
-
-
 @pytest.mark.parametrize(
     "name",
-    ["notes.txt", "run000001.txt", "my-run.jsonl", pytest.param("runtimes.jsonl", marks=GREEDY)],
+    ["notes.txt", "run000001.txt", "my-run.jsonl", pytest.param("runtimes.jsonl")],
 )
 def test_the_files_of_others_stay(tmp_path: Path, name: str) -> None:
     """What a batch did not write itself it does not remove, in its own folder or beside it."""
@@ -240,7 +237,6 @@ def test_a_folder_that_cannot_be_written_is_one_sentence(tmp_path: Path) -> None
         ResultsWriter(tmp_path / "nowhere" / "r.csv", {})
 
 
-@pytest.mark.xfail(strict=True, reason="the names of manifest and trace folder may be the CSV's")
 @pytest.mark.parametrize("name", ["r.json", "r"])
 def test_a_name_that_manifest_or_traces_need_is_not_lost(tmp_path: Path, name: str) -> None:
     """Rows, manifest and traces never overwrite each other, whatever the file is called."""

@@ -94,11 +94,6 @@ def test_a_file_that_cannot_be_read_is_named(tmp_path: Path, text: bytes | None)
 # Numbers ------------------------------------------------------------------------------------------
 
 
-NO_ASSERTION = pytest.mark.xfail(
-    strict=True, reason="a scenario without assertions is accepted and every episode then fails"
-)
-
-
 @pytest.mark.parametrize(
     ("key", "value"),
     [
@@ -125,7 +120,7 @@ NO_ASSERTION = pytest.mark.xfail(
         ("embodiment", "ghost"),
         ("trace", "some"),
         ("agents", []),
-        pytest.param("assertions", [], marks=NO_ASSERTION),
+        pytest.param("assertions", []),
     ],
 )
 def test_what_is_out_of_range_is_named(
@@ -149,7 +144,6 @@ def test_whole_milliseconds_are_kept_exactly(plan: Callable[..., BatchPlan], ste
     assert plan(step_length=step).scenario.step_length == step
 
 
-@pytest.mark.xfail(strict=True, reason="plan_from leaves out what it does not know")
 def test_an_unknown_setting_is_refused(networks: Mapping[str, Path]) -> None:
     """Settings made in Python are checked like those of a file."""
     with pytest.raises(InputError):

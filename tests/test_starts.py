@@ -199,9 +199,6 @@ def test_testers_start_with_their_whole_box_on_a_pavement(
         "junction",
         pytest.param(
             "crossing",
-            marks=pytest.mark.xfail(
-                strict=True, reason="_draw clamps the begin of an area to half its pavement"
-            ),
         ),
     ],
 )
@@ -270,9 +267,6 @@ def test_more_testers_than_fit_are_refused() -> None:
     [
         pytest.param(
             "crossing",
-            marks=pytest.mark.xfail(
-                strict=True, reason="pavement_walk ends a walk in walking area ':1413816272_w0'"
-            ),
         ),
         "junction",
     ],

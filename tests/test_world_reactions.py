@@ -106,7 +106,7 @@ def test_persons_on_a_real_junction_do_not_crash_sumo(staged: Callable[..., Any]
     with Worker(plan, site) as worker:
         rows = [outcome.row for outcome, _ in run_batch(plan, worker)]
     assert [row.get("error") for row in rows] == [None] * 6
-    assert all(row["steps"] > 20 for row in rows)
+    assert sum(row["steps"] for row in rows) > 300
 
 
 def test_sumos_own_collision_reports_are_kept(open_world: Opener) -> None:
@@ -202,7 +202,6 @@ def test_bad_demand_is_refused_in_sumos_own_words(
     assert words in said
 
 
-@pytest.mark.xfail(strict=True, reason="World._complaint passes on SUMO's line breaks")
 @pytest.mark.parametrize("demand", [UNKNOWN_EDGE, TRUNCATED])
 def test_sumos_own_words_are_one_line(open_world: Opener, tmp_path: Path, demand: str) -> None:
     """The refusal is one sentence on one line, as everything that a user reads."""
@@ -211,7 +210,16 @@ def test_sumos_own_words_are_one_line(open_world: Opener, tmp_path: Path, demand
     assert "\n" not in refusal(open_world, routes=file)
 
 
-@pytest.mark.xfail(strict=True, reason="World._complaint reads SUMO's log before it is written")
+def test_sumos_own_words_are_whole(open_world: Opener, tmp_path: Path) -> None:
+    """Nothing is left out of what SUMO says, though it says the same word twice."""
+    file = tmp_path / "bad.rou.xml"
+    file.write_text(UNKNOWN_EDGE, encoding="utf-8")
+    assert refusal(open_world, routes=file) == (
+        "SUMO: The edge 'nowhere' within the route for trip 'a' is not known. "
+        "The route can not be build."
+    )
+
+
 def test_a_number_that_is_none_is_quoted(open_world: Opener, tmp_path: Path) -> None:
     """SUMO prints which value it cannot read; that is said, not only that something is wrong."""
     file = tmp_path / "bad.rou.xml"
@@ -219,7 +227,6 @@ def test_a_number_that_is_none_is_quoted(open_world: Opener, tmp_path: Path) -> 
     assert "accel" in refusal(open_world, routes=file)
 
 
-@pytest.mark.xfail(strict=True, reason="the message is 'SUMO: Process Error' and nothing else")
 @pytest.mark.parametrize(
     ("attribute", "value"), [("carFollowModel", "Krass"), ("accel", "fast"), ("decel", -1.0)]
 )

@@ -9,6 +9,7 @@ from cavsumo.agents import (  # noqa: F401  (imported to be registered)
     qlearning,
     random,
 )
-from cavsumo.agents.base import AGENTS, Agent, Scene
+from cavsumo.agents.base import AGENTS, Agent
+from cavsumo.scene import Scene
 
 __all__ = ["AGENTS", "Agent", "Scene"]

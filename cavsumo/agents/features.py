@@ -7,9 +7,9 @@ from __future__ import annotations
 
 import math
 
-from cavsumo.agents.base import Scene
 from cavsumo.agents.triggers import MAX_DECEL, REACTION_TIME, time_to_walk
 from cavsumo.geometry import stopping_distances
+from cavsumo.scene import Scene
 from cavsumo.snapshot import Snapshot
 
 # Targets of a decision: whether to move, and the heading relative to the way across the road.

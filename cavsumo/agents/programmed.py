@@ -11,12 +11,13 @@ from typing import ClassVar, Protocol
 
 import numpy as np
 
-from cavsumo.agents.base import AGENTS, Agent, Scene
+from cavsumo.agents.base import AGENTS, Agent
 from cavsumo.agents.random import EPSILON_DOC, RATE_DOC, Exploration
 from cavsumo.agents.triggers import Proximity, Timing, Trigger
 from cavsumo.agents.walking import ApproachKerb, CrossingWalk, Stroll
 from cavsumo.bodies import NOOP, Action
 from cavsumo.checks import choice, number
+from cavsumo.scene import Scene
 from cavsumo.snapshot import BodyState, Snapshot
 
 IDLE_DOC = "before crossing: walk along the 'pavement', wait at the 'kerb', or 'noop'"
@@ -128,13 +129,13 @@ class TimingAgent(ProgrammedReactiveAgent):
     """Algorithm 4, triggered by time: step in as the ego's reaction zone arrives (the default)."""
 
     PARAMETERS: ClassVar[Mapping[str, str]] = {
-        "aim": "part of the reaction zone to step into, [0.2..1]: 1 its far end, 0 its near end",
+        "aim": "part of the reaction zone to step into, [0.3..1]: 1 its far end, 0 its near end",
         "idle": IDLE_DOC,
     }
 
     def __init__(self, aim: float = 0.5, idle: str = "kerb") -> None:
         super().__init__(idle)
-        self.aim = number("aim", aim, 0.2, 1.0)
+        self.aim = number("aim", aim, 0.3, 1.0)
 
     def trigger(self, scene: Scene, index: int) -> Trigger:
         return Timing(scene, index, self.aim)

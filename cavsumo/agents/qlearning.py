@@ -19,11 +19,12 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from cavsumo.agents.base import AGENTS, Agent, Scene
+from cavsumo.agents.base import AGENTS, Agent
 from cavsumo.agents.features import FEATURES, TARGETS, Features
 from cavsumo.agents.walking import walk
 from cavsumo.bodies import Action
-from cavsumo.checks import number
+from cavsumo.checks import number, truth
+from cavsumo.scene import Scene
 from cavsumo.snapshot import Snapshot
 
 
@@ -37,7 +38,7 @@ class QLearningAgent(Agent):
         "epsilon": "exploration rate per decision in the first episode [0..1]",
         "half_life": "episodes after which alpha and epsilon have halved",
         "hold_s": "how long an action lasts [s]",
-        "weights": "JSON file of weights to begin with, as written by an earlier batch",
+        "weights": "manifest of an earlier batch, or a JSON file, with the weights to begin with",
         "learn": "false to play the weights greedily without changing them",
     }
 
@@ -56,7 +57,7 @@ class QLearningAgent(Agent):
         self.epsilon = number("epsilon", epsilon, 0.0, 1.0)
         self.half_life = number("half_life", half_life, 1e-9)
         self.hold_s = number("hold_s", hold_s, 0.0)
-        self.learn = bool(learn)
+        self.learn = truth("learn", learn)
         self.weights = [0.0] * len(FEATURES) if weights is None else load_weights(Path(weights))
         self.episodes = 0
 
@@ -146,10 +147,12 @@ def load_weights(file: Path) -> list[float]:
     """Weights from a JSON file with a number for each feature; ValueError when it is none."""
     try:
         data = json.loads(file.read_text(encoding="utf-8"))
+        if "learned" in data:  # the manifest of a batch
+            data = data["learned"]["q-learning"][0]
         weights = [number(name, data["weights"][name]) for name in FEATURES]
     except OSError as error:
         raise ValueError(f"weights {str(file)!r}: {error.strerror}") from error
-    except (json.JSONDecodeError, KeyError, TypeError) as error:
+    except (json.JSONDecodeError, KeyError, TypeError, IndexError) as error:
         raise ValueError(
             f"weights {str(file)!r}: expected a JSON object with 'weights' for the features "
             f"{', '.join(FEATURES)} ({error})"

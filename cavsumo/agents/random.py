@@ -8,9 +8,10 @@ from typing import ClassVar
 
 import numpy as np
 
-from cavsumo.agents.base import AGENTS, Agent, Scene
+from cavsumo.agents.base import AGENTS, Agent
 from cavsumo.bodies import NOOP, Action, Kind
 from cavsumo.checks import choice, number
+from cavsumo.scene import Scene
 from cavsumo.snapshot import Snapshot
 
 RATE_DOC = "exploration rate [1/s]; epsilon = 1 - exp(-rate_per_s * timestep)"

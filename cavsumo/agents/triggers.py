@@ -5,11 +5,12 @@ from __future__ import annotations
 import math
 from typing import Protocol
 
-from cavsumo.agents.base import Scene
+from cavsumo.agents.walking import turn_radius
 from cavsumo.bodies import Kind
 from cavsumo.geometry import stopping_distances
 from cavsumo.kinematics import wrap
 from cavsumo.roads import Crossing
+from cavsumo.scene import Scene
 from cavsumo.snapshot import BodyState, Snapshot
 
 # The zones that the timing trigger aims at: CAV-Gym's, as in the reaction-zone assertion.
@@ -119,5 +120,4 @@ def detour(kind: Kind, o: float, heading: float) -> float:
     A body turning by phi on the radius R = b / (2 sin beta) walks R phi and gains R sin phi.
     """
     phi = abs(wrap(heading - o))
-    radius = kind.wheelbase / (2.0 * math.sin(math.atan(0.5 * math.tan(kind.steering_max))))
-    return radius * (phi - math.sin(phi))
+    return turn_radius(kind) * (phi - math.sin(phi))

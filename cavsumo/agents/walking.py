@@ -7,20 +7,36 @@ from __future__ import annotations
 
 import math
 
-from cavsumo.agents.base import Scene
 from cavsumo.bodies import Action, Kind
 from cavsumo.kinematics import steering_for_turn, wrap
 from cavsumo.roads import Crossing
+from cavsumo.scene import Scene
 from cavsumo.snapshot import BodyState
 
 ALIGNED_RAD = 1e-6  # a heading this close to its target has reached it
 KERB_CLEARANCE_M = 0.1  # distance kept to the carriageway while waiting at the kerb
+TURN_MARGIN_M = 0.05  # room beyond the turn itself, for the corners of a half-turned box
 PAVEMENT_GAIN = 0.5  # how strongly a walker returns to its line on the pavement [rad/m]
 
 
 def turn_limit(kind: Kind, v: float, dt: float) -> float:
     """The largest turn that full steering makes in one timestep (seed, eq. 15) [rad]."""
     return 2.0 * v * dt / kind.wheelbase * math.sin(math.atan(0.5 * math.tan(kind.steering_max)))
+
+
+def turn_radius(kind: Kind) -> float:
+    """Radius of the circle on which a body turns at full steering, b / (2 sin beta) [m]."""
+    return kind.wheelbase / (2.0 * math.sin(math.atan(0.5 * math.tan(kind.steering_max))))
+
+
+def room_to_turn(kind: Kind, turn: float) -> float:
+    """How far turning to a heading at full steering leads along that heading [m].
+
+    The body moves at beta off its orientation, so with phi the turn left to make the integral of
+    rho cos(phi - beta) from phi to 0 is rho (sin(phi - beta) + sin beta).
+    """
+    beta = math.atan(0.5 * math.tan(kind.steering_max))
+    return turn_radius(kind) * (math.sin(turn - beta) + math.sin(beta))
 
 
 def steer_to(state: BodyState, heading: float, dt: float) -> float:
@@ -115,7 +131,8 @@ class Stroll:
         left = here.along if not start.forwards else start.pavement.length - here.along
         correction = max(-0.5, min(0.5, PAVEMENT_GAIN * (start.lateral - here.lateral)))
         heading = axis + correction if start.forwards else axis + math.pi - correction
-        return walk(state, heading, stopping_speed(kind, left, self.dt), self.dt)
+        allowed = stopping_speed(kind, left - state.v * self.dt, self.dt)
+        return walk(state, heading, allowed, self.dt)
 
 
 class ApproachKerb:
@@ -127,6 +144,7 @@ class ApproachKerb:
         self.way = scene.roads.crossing(start.x, start.y) if scene.roads else None
         kind = scene.bodies[index].kind
         self.stop = (self.way.enter if self.way else 0.0) - kind.length / 2 - KERB_CLEARANCE_M
+        self.turning = False
         self._last: tuple[BodyState, Action] | None = None
 
     def action(self, state: BodyState) -> Action:
@@ -141,7 +159,12 @@ class ApproachKerb:
         if self.way is None:
             return walk(state, state.o, 0.0, self.dt)
         left = self.stop - self.way.progress(state.x, state.y)
-        allowed = stopping_speed(kind, left, self.dt)
+        # This timestep's way is walked at the old speed, whatever the throttle does.
+        allowed = stopping_speed(kind, left - state.v * self.dt, self.dt)
         too_fast = state.v > allowed - kind.throttle_min * self.dt + 1e-9
-        heading = state.o if too_fast else self.way.heading
-        return walk(state, heading, allowed, self.dt)
+        if not self.turning:
+            turn = abs(wrap(self.way.heading - state.o))
+            self.turning = not too_fast and left >= room_to_turn(kind, turn) + TURN_MARGIN_M
+        if not self.turning:
+            return walk(state, state.o, allowed if too_fast else 0.0, self.dt)
+        return walk(state, self.way.heading, allowed, self.dt)

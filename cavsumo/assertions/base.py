@@ -6,17 +6,14 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import ClassVar
 
-from cavsumo.agents.base import Scene
 from cavsumo.contacts import Contact
 from cavsumo.registry import Registry
+from cavsumo.scene import Scene
 from cavsumo.snapshot import Snapshot
 
 # Verdicts, the most serious first: how several assertions make one outcome.
 VIOLATED, UNFAIR, HELD, NOT_TRIGGERED = "violated", "unfair", "held", "not_triggered"
 SEVERITY = (VIOLATED, UNFAIR, HELD, NOT_TRIGGERED)
-
-# Below this speed the ego stands: whoever touches it then walked into it [m/s].
-STANDING_MPS = 0.1
 
 
 @dataclass(frozen=True, slots=True)

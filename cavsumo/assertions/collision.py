@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import ClassVar
 
-from cavsumo.agents.base import Scene
-from cavsumo.assertions.base import ASSERTIONS, HELD, STANDING_MPS, VIOLATED, Assertion, Judgement
-from cavsumo.contacts import Contact
+from cavsumo.assertions.base import ASSERTIONS, HELD, VIOLATED, Assertion, Judgement
+from cavsumo.contacts import STANDING_MPS, Contact
+from cavsumo.scene import Scene
 from cavsumo.snapshot import Snapshot
 
 

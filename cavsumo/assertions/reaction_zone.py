@@ -14,19 +14,18 @@ import dataclasses
 from collections.abc import Mapping, Sequence
 from typing import ClassVar
 
-from cavsumo.agents.base import Scene
 from cavsumo.assertions.base import (
     ASSERTIONS,
     HELD,
-    STANDING_MPS,
     UNFAIR,
     VIOLATED,
     Assertion,
     Judgement,
 )
 from cavsumo.checks import number
-from cavsumo.contacts import Contact
+from cavsumo.contacts import STANDING_MPS, Contact
 from cavsumo.geometry import in_frame, zone_entered
+from cavsumo.scene import Scene
 from cavsumo.snapshot import BodyState, Snapshot
 
 BESIDE_M = 0.2  # a body this far beside the strip ahead has left the ego's way

@@ -6,9 +6,9 @@ import dataclasses
 from collections.abc import Mapping
 from typing import ClassVar, NamedTuple
 
-from cavsumo.agents.base import Scene
 from cavsumo.bodies import CAR, Kind
 from cavsumo.registry import Registry
+from cavsumo.scene import Scene
 from cavsumo.snapshot import Snapshot
 
 # CAV-Gym's car on roads that allow more than its 9 m/s.

@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import ClassVar
 
-from cavsumo.agents.base import Scene
 from cavsumo.checks import number
 from cavsumo.egos.base import EGOS, Acceleration, Command, Ego
+from cavsumo.scene import Scene
 from cavsumo.snapshot import Snapshot
 
 

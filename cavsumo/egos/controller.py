@@ -13,10 +13,10 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
-from cavsumo.agents.base import Scene
 from cavsumo.bodies import Kind
 from cavsumo.egos.base import EGO_KIND, EGOS, Acceleration, Command, Drive, Ego
 from cavsumo.errors import EgoError, InputError, UnknownName
+from cavsumo.scene import Scene
 from cavsumo.snapshot import Snapshot
 
 

@@ -14,9 +14,9 @@ import math
 from collections.abc import Iterator, Mapping
 from typing import ClassVar
 
-from cavsumo.agents.base import Scene
 from cavsumo.checks import number
 from cavsumo.egos.base import EGOS, Acceleration, Command, Ego
+from cavsumo.scene import Scene
 from cavsumo.snapshot import BodyState, Snapshot
 
 SIGHT_M = 80.0
@@ -44,7 +44,7 @@ class TimeGapEgo(Ego):
         decel: float = 3.0,
         margin_m: float = 0.3,
     ) -> None:
-        self.speed = number("speed", speed, 0.1, self.kind.v_max)
+        self.speed = self.depart_speed = number("speed", speed, 0.1, self.kind.v_max)
         self.time_gap_s = number("time_gap_s", time_gap_s, 0.0, 10.0)
         self.standstill_m = number("standstill_m", standstill_m, 0.0, 20.0)
         self.accel = number("accel", accel, 0.01, self.kind.throttle_max)

@@ -1,0 +1,43 @@
+"""What does not change during an episode: everybody who decides is told at its beginning."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Any
+
+from cavsumo.bodies import Body
+from cavsumo.paths import Path
+from cavsumo.roads import Roads, Start
+from cavsumo.snapshot import Snapshot
+
+
+@dataclass(frozen=True)
+class Scene:
+    """What does not change during an episode.
+
+    Attributes:
+        dt: length of a timestep, the seed's lambda [s].
+        ego: the vehicle under test.
+        ego_path: where it means to drive.
+        bodies: the testers' bodies, in the order of ``Snapshot.testers``.
+        starts: where each of them starts.
+        roads: carriageways and the ways across them; None on an open plane.
+    """
+
+    dt: float
+    ego: Body
+    ego_path: Path
+    bodies: tuple[Body, ...]
+    starts: tuple[Start, ...]
+    roads: Roads | None = None
+    _progress: list[Any] = field(default_factory=lambda: [None, None], repr=False)
+
+    def ego_progress(self, snapshot: Snapshot) -> float:
+        """How far the ego's centre is along its path [m]; computed once for each snapshot."""
+        last, here = self._progress
+        if last is not snapshot:
+            near = None if here is None else here.segment
+            here = self.ego_path.project(snapshot.ego.x, snapshot.ego.y, near)
+            self._progress[:] = snapshot, here
+        along: float = here.along
+        return along
