@@ -159,9 +159,8 @@ def replayed(plan: BatchPlan, site: Site, run_number: int) -> Outcome:
 def _warn_of_changes(recorded: Mapping[str, Any], now: Mapping[str, Any]) -> None:
     """Say on stderr what differs from the day of the recording."""
     for part in ("versions", "sha256", "sumo_options"):
-        before = recorded.get(part, {})
+        before = recorded.get(part)
+        was = before if isinstance(before, dict) else {}
         for name, value in now[part].items():
-            if before.get(name) != value:
-                print(
-                    f"cavsumo: {part}: {name} was {before.get(name)}, is {value}", file=sys.stderr
-                )
+            if was.get(name) != value:
+                print(f"cavsumo: {part}: {name} was {was.get(name)}, is {value}", file=sys.stderr)

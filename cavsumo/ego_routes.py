@@ -8,7 +8,7 @@ from itertools import pairwise
 from typing import Any
 
 from cavsumo.errors import NetworkError
-from cavsumo.network import Network, driving_lanes, is_pavement, lane_path
+from cavsumo.network import Network, driving_lanes, is_normal, is_pavement, lane_path
 from cavsumo.paths import Path
 
 APPROACH_M = 80.0  # how far before the junction the ego starts, where the roads allow it
@@ -85,7 +85,7 @@ def _movements(node: Any) -> list[_Movement]:
         for lane in driving_lanes(into):
             for link in lane.getOutgoing():
                 out, direction = link.getTo(), str(link.getDirection())
-                if direction not in BACK and driving_lanes(out):
+                if direction not in BACK and is_normal(into) and driving_lanes(out):
                     found.setdefault(
                         (into.getID(), out.getID()), _Movement(into, out, node, direction)
                     )

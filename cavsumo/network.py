@@ -39,15 +39,16 @@ class Network:
         self.file = file
         self.net = net
         self.edges: list[Any] = sorted(
-            (e for e in net.getEdges() if e.getFunction() in ("", "connector")),
+            (e for e in net.getEdges() if is_normal(e)),
             key=lambda e: str(e.getID()),
         )
 
     def edge(self, edge_id: str) -> Any:
-        """The edge of that id; raises UnknownName with the nearest one."""
-        if not self.net.hasEdge(edge_id):
-            raise UnknownName("edge", edge_id, (e.getID() for e in self.edges), str(self.file))
-        return self.net.getEdge(edge_id)
+        """The normal edge of that id; raises UnknownName with the nearest one."""
+        edges = {e.getID(): e for e in self.edges}
+        if edge_id not in edges:
+            raise UnknownName("edge", edge_id, edges, str(self.file))
+        return edges[edge_id]
 
     def junction(self, junction_id: str) -> Any:
         """The junction of that id; raises UnknownName with the nearest one."""
@@ -114,6 +115,11 @@ def read_network(file: FilePath) -> Network:
     return network
 
 
+def is_normal(edge: Any) -> bool:
+    """Whether an edge is a road, not the inside of a junction."""
+    return edge.getFunction() in ("", "connector")
+
+
 def driving_lanes(edge: Any) -> list[Any]:
     """The lanes of an edge on which a passenger car may drive, rightmost first."""
     return [lane for lane in edge.getLanes() if lane.allows("passenger")]
@@ -136,7 +142,7 @@ def pavement_walk(edge: Any) -> tuple[str, ...]:
     onward = sorted(
         (e.getID() in back, str(e.getID()))
         for e in edge.getToNode().getOutgoing()
-        if e.getFunction() in ("", "connector") and any(is_pavement(lane) for lane in e.getLanes())
+        if is_normal(e) and any(is_pavement(lane) for lane in e.getLanes())
     )
     return (str(edge.getID()), *(edge_id for _, edge_id in onward[:1]))
 

@@ -10,6 +10,9 @@ OPTIONS: Mapping[str, str] = {
     "collision.mingap-factor": "0",  # physical contact only
     "time-to-teleport": "-1",  # a standing body must not jump
     "pedestrian.model": "striping",  # the others ignore moved persons, or hang
+    # An ego with an actionStepLength silently makes SUMO integrate all traffic ballistically;
+    # always doing so lets different egos meet the same traffic.
+    "step-method.ballistic": "true",
     "precision": "6",
     "no-step-log": "true",
     "no-warnings": "true",

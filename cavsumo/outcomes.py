@@ -182,7 +182,11 @@ def read_rows(csv_file: Path) -> list[dict[str, str]]:
     """The rows of a results file, as text."""
     try:
         with csv_file.open(encoding="utf-8", newline="") as stream:
-            return list(csv.DictReader(stream))
+            reader = csv.DictReader(stream)
+            missing = [column for column in COLUMNS if column not in (reader.fieldnames or ())]
+            if missing:
+                raise ResultsError(f"results {str(csv_file)!r}: no column {missing[0]!r}")
+            return list(reader)
     except (OSError, UnicodeDecodeError, csv.Error) as error:
         raise ResultsError(f"results {str(csv_file)!r}: cannot be read: {error}") from error
 

@@ -33,7 +33,7 @@ def recorded_row(csv_file: Path, run: int) -> dict[str, str]:
 
 def recorded_frames(csv_file: Path, row: Mapping[str, str]) -> list[dict[str, Any]] | None:
     """The frames of an episode, None when none were kept."""
-    return read_trace(csv_file.parent / row["trace"]) if row["trace"] else None
+    return read_trace(csv_file.parent / row["trace"]) if row.get("trace") else None
 
 
 def first_difference(

@@ -37,7 +37,7 @@ class Theatre:
             horizon=scenario.end,
             start_speed=scenario.start_speed,
         )
-        self._agents: dict[str, list[Agent]] = {}
+        self._agents: dict[str, tuple[list[Agent], tuple[Any, ...] | None]] = {}
 
     def __enter__(self) -> Theatre:
         return self
@@ -68,9 +68,11 @@ class Theatre:
     def _cast(self, job: Job) -> list[Agent]:
         """The agents of a job, with their memory."""
         if job.agent not in self._agents:
-            self._agents[job.agent] = make_agents(self.plan, job.agent)
-        agents = self._agents[job.agent]
-        for agent, memory in zip(agents, job.memory or (), strict=False):
+            agents = make_agents(self.plan, job.agent)
+            self._agents[job.agent] = agents, _recall(agents)
+        agents, unlearned = self._agents[job.agent]
+        memories = unlearned if job.memory is None else job.memory
+        for agent, memory in zip(agents, memories or (), strict=False):
             agent.remember(memory)
         return agents
 
