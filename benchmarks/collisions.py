@@ -174,7 +174,10 @@ class Watch(Assertion):
             return "laid along the lane"
         others = {i for i, lane in self._before.items() if lane == p.lane}
         others.update(libsumo.lane.getLastStepVehicleIDs(p.lane))
-        return "not neighbours" if others - {a, b} else "unexplained"
+        if others - {a, b}:
+            return "not neighbours"
+        together = self._before.get(a) == self._before.get(b) == p.lane
+        return "unexplained" if together else "a step late"
 
     def _why_only_sumo(self, a: BodyState, b: BodyState, p: Place, q: Place, report: Report) -> str:
         """Why SUMO reports two bodies that are apart."""
