@@ -38,20 +38,23 @@ class Ledger:
         self, successor: Snapshot, judgements: Sequence[Judgement]
     ) -> tuple[list[float], bool] | None:
         """Each agent's reward for a timestep and whether the game ends; None once it is over."""
-        testers = successor.testers
-        on_road = [self._is_on_road(i, body) for i, body in enumerate(testers)]
-        self.cost += self._dt * sum(on_road)
+        testers, on_road = successor.testers, self._on_road
+        for i, body in enumerate(testers):
+            if body.v > 0.0 or self._leeway[i] <= 0.0:
+                self._look_up(i, body)
+        if any(on_road):
+            self.cost += self._dt * sum(on_road)
         if self._over:
             return None
-        rewards = [
-            -self._dt * (TIME_COST + ROAD_COST * sum([on_road[i] for i in team]))
-            for team in self._teams
-        ]
+        rewards = [-self._dt * TIME_COST] * len(self._teams)
+        if any(on_road):
+            for a, team in enumerate(self._teams):
+                rewards[a] -= self._dt * ROAD_COST * sum([on_road[i] for i in team])
         for judgement in judgements:
             if judgement.tester:  # somebody reached the goal, or spoilt it
                 self._over = True
                 for a, team in enumerate(self._teams):
-                    if judgement.triggered and judgement.tester in (testers[i].id for i in team):
+                    if judgement.triggered and judgement.tester in [testers[i].id for i in team]:
                         rewards[a] += GOAL
         self.total += sum(rewards)
         return rewards, self._over
@@ -65,10 +68,9 @@ class Ledger:
         self.total += sum(rewards)
         return rewards, True
 
-    def _is_on_road(self, i: int, body: BodyState) -> bool:
-        """Whether a body's centre is on the carriageway."""
-        self._leeway[i] -= body.body.kind.v_max * self._dt if body.v > 0.0 else 0.0
+    def _look_up(self, i: int, body: BodyState) -> None:
+        """Note whether a moving body's centre is on the carriageway."""
+        self._leeway[i] -= body.body.kind.v_max * self._dt
         if self._roads is not None and self._leeway[i] <= 0.0:
             self._on_road[i] = self._roads.contains(body.x, body.y)
             self._leeway[i] = max(1e-3, self._roads.edge_distance(body.x, body.y))
-        return self._on_road[i]

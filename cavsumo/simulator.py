@@ -81,6 +81,7 @@ def play(stage: Stage, agents: Sequence[Agent], seed: int, *, record: bool = Fal
     ledger = Ledger(scene, stage.teams)
     episode = Episode(Judgement(""))
     _observe(stage, episode, snapshot, record)
+    learners = any(type(a).process_feedback is not Agent.process_feedback for a in agents)
     while not _over(stage, snapshot):
         actions = [agent.choose_action(snapshot) for agent in agents]
         states = _moved(snapshot.testers, stage.teams, actions, scene.dt)
@@ -89,10 +90,13 @@ def play(stage: Stage, agents: Sequence[Agent], seed: int, *, record: bool = Fal
         if successor is None or (isinstance(command, Drive) and _at_end(scene, successor)):
             _feed_back(agents, snapshot, actions, ledger.lost(), snapshot)
             break
-        episode.max_decel = max(episode.max_decel, (snapshot.ego.v - successor.ego.v) / scene.dt)
+        braking = (snapshot.ego.v - successor.ego.v) / scene.dt
+        if braking > episode.max_decel:
+            episode.max_decel = braking
         _observe(stage, episode, successor, record)
         rewards = ledger.rewards(successor, [a.judgement for a in stage.assertions])
-        _feed_back(agents, snapshot, actions, rewards, successor)
+        if learners:
+            _feed_back(agents, snapshot, actions, rewards, successor)
         snapshot = successor
     return _finished(stage, episode, snapshot, ledger)
 

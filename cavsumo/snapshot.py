@@ -6,7 +6,6 @@ somebody asks for them, because most agents never do.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import NamedTuple
 
 from cavsumo.bodies import Body
@@ -37,8 +36,7 @@ class BodyState(NamedTuple):
 RawState = tuple[Body, float, float, float, float]
 
 
-@dataclass(frozen=True, slots=True)
-class Snapshot:
+class Snapshot(NamedTuple):
     """The state s of the simulation.
 
     Attributes:

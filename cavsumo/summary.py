@@ -97,14 +97,22 @@ def _say_first(rows: Rows, csv_file: Path, console: Console) -> None:
     """Point to the first failure, else the first test, and how to see it again."""
     for what, chosen in (("failure", is_failure), ("test", is_test)):
         for row in filter(chosen, rows):
-            when = row["violation_time_s"] if what == "failure" else row["trigger_time_s"]
-            event = "collision" if what == "failure" else f"{row['assertion']} triggered"
             _say(
                 console,
-                f"first {what}: run {row['run']} ({row['agent']}): {event} at {when:.1f} s "
-                f"with {row['tester']}\n       cavsumo replay {csv_file} {row['run']}",
+                f"first {what}: run {row['run']} ({row['agent']}): {_event(row)}"
+                f"\n       cavsumo replay {csv_file} {row['run']}",
             )
             return
+
+
+def _event(row: Mapping[str, Any]) -> str:
+    """What happened in a test, when and with whom."""
+    violated = is_failure(row)
+    when = row["violation_time_s"] if violated else row["trigger_time_s"]
+    hit = violated and row["impact_speed_mps"] is not None
+    what = "collision" if hit else f"{row['assertion']} {'violated' if violated else 'triggered'}"
+    whom = f" with {row['tester']}" if row["tester"] else ""
+    return f"{what} at {when:.1f} s{whom}"
 
 
 def _say(console: Console, text: str) -> None:
