@@ -28,11 +28,18 @@ from cavsumo.scenario import BatchPlan, plan_from
 from cavsumo.site import Site, derive_site
 from cavsumo.summary import summarise
 
+ON_PAVEMENTS = ("pedestrian", "bicycle")  # kinds of body that may start there
+
 
 def run(settings: Mapping[str, Any], output: Path, quiet: bool, exit_zero: bool) -> int:
     """``cavsumo run``: everything is checked before anything is written."""
     plan = plan_from(settings, "run")
     site = prepare(plan)
+    if plan.scenario.kind not in ON_PAVEMENTS:
+        raise InputError(
+            f"kind {plan.scenario.kind!r}: testers start on pavements, where only "
+            f"{' and '.join(ON_PAVEMENTS)} can be"
+        )
     _check_output(output)
     with Worker(plan, site) as worker:
         if not quiet:

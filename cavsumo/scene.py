@@ -7,7 +7,7 @@ from typing import Any
 
 from cavsumo.bodies import Body
 from cavsumo.paths import Path
-from cavsumo.roads import Roads, Start
+from cavsumo.roads import Crossing, Roads, Start
 from cavsumo.snapshot import Snapshot
 
 
@@ -31,6 +31,14 @@ class Scene:
     starts: tuple[Start, ...]
     roads: Roads | None = None
     _progress: list[Any] = field(default_factory=lambda: [None, None], repr=False)
+    _ways: dict[int, Crossing | None] = field(default_factory=dict, repr=False)
+
+    def way(self, index: int) -> Crossing | None:
+        """The way across the road from where a body starts; computed once."""
+        if index not in self._ways:
+            start = self.starts[index]
+            self._ways[index] = self.roads.crossing(start.x, start.y) if self.roads else None
+        return self._ways[index]
 
     def ego_progress(self, snapshot: Snapshot) -> float:
         """How far the ego's centre is along its path [m]; computed once for each snapshot."""

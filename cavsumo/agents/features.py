@@ -38,9 +38,8 @@ class Features:
 
     def __init__(self, scene: Scene, index: int) -> None:
         self.scene, self.index = scene, index
-        start = scene.starts[index]
-        self.way = scene.roads.crossing(start.x, start.y) if scene.roads else None
-        self.across = self.way.heading if self.way else start.o
+        way = scene.way(index)
+        self.across = way.heading if way else scene.starts[index].o
 
     def values(self, snapshot: Snapshot, target: int) -> list[float]:
         """The features of choosing a target now."""

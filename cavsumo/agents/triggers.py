@@ -63,7 +63,7 @@ class Timing:
         self.scene, self.aim = scene, aim
         self.ego_half = scene.ego.kind.length / 2
         start, kind = scene.starts[index], scene.bodies[index].kind
-        self.way = scene.roads.crossing(start.x, start.y) if scene.roads else None
+        self.way = scene.way(index)
         meeting = scene.ego_path.meet(start.x, start.y, self.way.heading) if self.way else None
         self.meeting = None if meeting is None else meeting[1]
         self._last: tuple[BodyState, float | None] | None = None

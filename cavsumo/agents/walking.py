@@ -140,8 +140,7 @@ class ApproachKerb:
 
     def __init__(self, scene: Scene, index: int) -> None:
         self.dt = scene.dt
-        start = scene.starts[index]
-        self.way = scene.roads.crossing(start.x, start.y) if scene.roads else None
+        self.way = scene.way(index)
         kind = scene.bodies[index].kind
         self.stop = (self.way.enter if self.way else 0.0) - kind.length / 2 - KERB_CLEARANCE_M
         self.turning = False
