@@ -14,9 +14,6 @@ from cavsumo.snapshot import BodyState, RawState, Snapshot
 
 # Below this speed the ego stands: whoever touches it then walked into it [m/s].
 STANDING_MPS = 0.1
-# No two centres farther apart than this belong to bodies that touch: the longest vehicle that SUMO
-# knows without being told is a train of 135 m.
-FAR = 75.0
 KEPT = 64  # candidates for the smallest gap before they are weeded
 
 
@@ -128,13 +125,12 @@ def _meetings_of_testers(snapshot: Snapshot) -> list[Pair]:
 def _touching(one: BodyState, others: tuple[RawState, ...]) -> list[BodyState]:
     """Those among the others whose boxes touch one body's."""
     body, x, y, _, _ = one
-    left, right = x - FAR, x + FAR
-    near = [other for other in others if left < other[1] < right and abs(other[2] - y) < FAR]
-    if not near:
-        return []
-    states = [
-        BodyState(*other)
-        for other in near
-        if math.hypot(other[1] - x, other[2] - y) <= body.kind.reach + other[0].kind.reach
+    reach = body.kind.reach
+    near = [
+        other
+        for other in others
+        # Centres farther apart than both reaches, on one axis alone, rule most bodies out.
+        if abs(other[1] - x) <= reach + other[0].kind.reach
+        and abs(other[2] - y) <= reach + other[0].kind.reach
     ]
-    return [state for state in states if overlap(one.box, state.box)]
+    return [state for state in map(BodyState._make, near) if overlap(one.box, state.box)]

@@ -6,6 +6,7 @@ carriageway cost. Everything else, an unfair episode included, is worth nothing.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 
 from cavsumo.assertions.base import Judgement
@@ -29,10 +30,10 @@ class Ledger:
         self.cost = self.total = 0.0
         self._dt, self._roads, self._teams = scene.dt, scene.roads, teams
         self._over = False
-        # Whether a body is on the carriageway, and how far it may still walk before that can
-        # change; asking the map is dear, so it is asked no earlier.
+        # Whether a body is on the carriageway, where that was looked up, and how far from there it
+        # cannot change; asking the map is dear, so it is asked no earlier.
         self._on_road = [False] * len(scene.bodies)
-        self._leeway = [0.0] * len(scene.bodies)
+        self._known = [(math.inf, math.inf, 0.0)] * len(scene.bodies)
 
     def rewards(
         self, successor: Snapshot, judgements: Sequence[Judgement]
@@ -40,7 +41,8 @@ class Ledger:
         """Each agent's reward for a timestep and whether the game ends; None once it is over."""
         testers, on_road = successor.testers, self._on_road
         for i, body in enumerate(testers):
-            if body.v > 0.0 or self._leeway[i] <= 0.0:
+            x, y, leeway = self._known[i]
+            if math.hypot(body.x - x, body.y - y) >= leeway:
                 self._look_up(i, body)
         if any(on_road):
             self.cost += self._dt * sum(on_road)
@@ -69,8 +71,9 @@ class Ledger:
         return rewards, True
 
     def _look_up(self, i: int, body: BodyState) -> None:
-        """Note whether a moving body's centre is on the carriageway."""
-        self._leeway[i] -= body.body.kind.v_max * self._dt
-        if self._roads is not None and self._leeway[i] <= 0.0:
-            self._on_road[i] = self._roads.contains(body.x, body.y)
-            self._leeway[i] = max(1e-3, self._roads.edge_distance(body.x, body.y))
+        """Note whether a body's centre is on the carriageway."""
+        if self._roads is None:
+            self._known[i] = (body.x, body.y, math.inf)
+            return
+        self._on_road[i] = self._roads.contains(body.x, body.y)
+        self._known[i] = (body.x, body.y, self._roads.edge_distance(body.x, body.y))

@@ -54,7 +54,9 @@ def to_sumo(x: float, y: float, o: float, length: float) -> tuple[float, float, 
 
 def from_sumo(x: float, y: float, angle: float, length: float) -> tuple[float, float, float]:
     """The middle of the front edge and SUMO's degrees to centre and radians in (-pi, pi]."""
-    o, half = wrap(math.radians(90.0 - angle)), length / 2
+    o, half = (90.0 - angle) * RADIANS, length / 2  # SUMO's angles lie in [0, 360)
+    if o <= -math.pi:
+        o += 2 * math.pi
     return x - half * math.cos(o), y - half * math.sin(o), o
 
 

@@ -15,6 +15,7 @@ from cavsumo.snapshot import BodyState
 
 ALIGNED_RAD = 1e-6  # a heading this close to its target has reached it
 KERB_CLEARANCE_M = 0.1  # distance kept to the carriageway while waiting at the kerb
+THERE_M = 0.01  # a body this close to where it waits is there
 TURN_MARGIN_M = 0.05  # room beyond the turn itself, for the corners of a half-turned box
 PAVEMENT_GAIN = 0.5  # how strongly a walker returns to its line on the pavement [rad/m]
 
@@ -158,6 +159,8 @@ class ApproachKerb:
         if self.way is None:
             return walk(state, state.o, 0.0, self.dt)
         left = self.stop - self.way.progress(state.x, state.y)
+        if left < THERE_M:
+            return walk(state, state.o, 0.0, self.dt)  # or it would creep on for ever
         # This timestep's way is walked at the old speed, whatever the throttle does.
         allowed = stopping_speed(kind, left - state.v * self.dt, self.dt)
         too_fast = state.v > allowed - kind.throttle_min * self.dt + 1e-9
