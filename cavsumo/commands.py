@@ -13,7 +13,6 @@ from pathlib import Path
 from typing import Any
 
 from cavsumo import __version__
-from cavsumo.agents import AGENTS
 from cavsumo.assertions import ASSERTIONS
 from cavsumo.batch import Worker, run_batch
 from cavsumo.bodies import kind_named
@@ -64,8 +63,6 @@ def _check_output(output: Path) -> None:
 def prepare(plan: BatchPlan) -> Site:
     """Check every name and parameter of a plan and derive its site; raises InputError."""
     scenario = plan.scenario
-    for agent in plan.agents:
-        AGENTS.get(agent)
     check_agents(plan)
     for name in scenario.assertions:
         ASSERTIONS.make(name, scenario.assertion_params)

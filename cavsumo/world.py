@@ -311,18 +311,18 @@ class World:
 
 def _type_file(scenario: Scenario, ego: Ego) -> str:
     """An additional file with the vehicle types of the ego and of the tester's bodies."""
-    types = [("vType", "cavsumo_ego", {"vClass": "passenger"} | ego.vtype())]
+    types = [("cavsumo_ego", {"vClass": "passenger"} | ego.vtype())]
     for kind in KINDS.values():
         seen = scenario.sumo_width if kind is PEDESTRIAN else kind.width
         shape = {"length": f"{kind.length}", "width": f"{seen}", "minGap": "0"}
         shape |= {"guiShape": "passenger" if kind is CAR else kind.name}
-        types.append(("vType", f"cavsumo_{kind.name}", {"vClass": "passenger"} | shape))
+        types.append((f"cavsumo_{kind.name}", {"vClass": "passenger"} | shape))
         if kind is PEDESTRIAN:
-            types.append(("vType", "cavsumo_person", {"vClass": "pedestrian"} | shape))
+            types.append(("cavsumo_person", {"vClass": "pedestrian"} | shape))
     rows = [
-        f"  <{tag} id={quoteattr(name)} "
+        f"  <vType id={quoteattr(name)} "
         + " ".join(f"{k}={quoteattr(v)}" for k, v in attributes.items())
         + "/>"
-        for tag, name, attributes in types
+        for name, attributes in types
     ]
     return "\n".join(["<additional>", *rows, "</additional>", ""])

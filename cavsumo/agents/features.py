@@ -40,10 +40,13 @@ class Features:
         self.scene, self.index = scene, index
         way = scene.way(index)
         self.across = way.heading if way else scene.starts[index].o
+        self._seen: tuple[Snapshot, tuple[float, float, float]] | None = None
 
     def values(self, snapshot: Snapshot, target: int) -> list[float]:
         """The features of choosing a target now."""
-        ahead, beside, gap = self._look(snapshot)
+        if self._seen is None or self._seen[0] is not snapshot:
+            self._seen = snapshot, self._look(snapshot)  # the same for every target
+        ahead, beside, gap = self._seen[1]
         braking, reaction = stopping_distances(
             snapshot.ego.v, max_decel=MAX_DECEL, reaction_time=REACTION_TIME
         )
