@@ -20,19 +20,21 @@ from pathlib import Path
 import numpy as np
 
 from cavsumo.agents.walking import steer_to
-from cavsumo.batch import Worker, run_batch
+from cavsumo.batch import run_batch
 from cavsumo.bodies import PEDESTRIAN, Body
-from cavsumo.commands import prepare
+from cavsumo.executors import local_executor
 from cavsumo.geometry import Box, overlap, zone_entered
 from cavsumo.jobs import job
 from cavsumo.kinematics import step_floats
 from cavsumo.roads import Start
 from cavsumo.scenario import BatchPlan, plan_from
+from cavsumo.setting import Setting, prepare
 from cavsumo.site import Site
 from cavsumo.snapshot import BodyState
 from cavsumo.starts import draw_starts
 from cavsumo.statistics import rate
-from cavsumo.summary import interval, is_test, percent, test_rate
+from cavsumo.summary import interval, percent
+from cavsumo.tally import is_test, tallied
 
 ROOT = Path(__file__).resolve().parent.parent
 SETTINGS = {
@@ -82,7 +84,7 @@ def compare(runs: int) -> None:
         rows = play(testers, AGENTS, runs)
         for agent in AGENTS:
             mine = [r for r in rows if r["agent"] == agent]
-            found = test_rate(mine)
+            found = tallied(mine).rate("tests")
             unfair = sum(r["outcome"] == "unfair" for r in mine)
             theirs, low, high, _ = CAV_GYM[agent, testers]
             print(
@@ -97,10 +99,10 @@ def force(runs: int) -> None:
     print(f"\n{'timing':>9}  {'tests, 95 %':>22}  unfair  forceable  won of them  of the bound")
     for testers in (1, 3, 6):
         count = runs if testers == 1 else runs // 2
-        plan, site = setting(testers, ("timing",), count)
-        possible = [forceable_episode(plan, site, run) for run in range(count)]
+        made = setting(testers, ("timing",), count)
+        possible = [forceable_episode(made.plan, made.site, run) for run in range(count)]
         rows = play(testers, ("timing",), count)
-        found, bound = test_rate(rows), rate(sum(possible), count)
+        found, bound = tallied(rows).rate("tests"), rate(sum(possible), count)
         unfair = sum(r["outcome"] == "unfair" for r in rows)
         won = sum(p and is_test(r) for r, p in zip(rows, possible, strict=True))
         print(
@@ -110,21 +112,21 @@ def force(runs: int) -> None:
         )
 
 
-def setting(testers: int, agents: tuple[str, ...], runs: int) -> tuple[BatchPlan, Site]:
-    """The plan of a cell and its site."""
+def setting(testers: int, agents: tuple[str, ...], runs: int) -> Setting:
+    """The plan of a cell, ready to be played."""
     known = {"timing": {}, **dict.fromkeys(AGENTS, SETTINGS["params"])}
     params = known[agents[0]]
     plan = plan_from(
         SETTINGS | {"testers": testers, "agents": agents, "runs": runs, "params": params}, "cav_gym"
     )
-    return plan, prepare(plan)
+    return prepare(plan)
 
 
 def play(testers: int, agents: tuple[str, ...], runs: int) -> list[dict[str, object]]:
     """The rows of a cell."""
-    plan, site = setting(testers, agents, runs)
-    with Worker(plan, site) as worker:
-        return [outcome.row for outcome, _ in run_batch(plan, worker)]
+    made = setting(testers, agents, runs)
+    with local_executor(2) as executor:
+        return [outcome.row for outcome, _ in run_batch(made, executor, made.plan.todo())]
 
 
 def forceable_episode(plan: BatchPlan, site: Site, run: int) -> bool:

@@ -29,12 +29,12 @@ from typing import Any, ClassVar, NamedTuple
 import libsumo
 
 from cavsumo.assertions.base import ASSERTIONS, Assertion
-from cavsumo.commands import prepare
 from cavsumo.contacts import Contact
 from cavsumo.geometry import gap, in_frame, overlap
 from cavsumo.jobs import job, make_agents
 from cavsumo.scenario import plan_from
 from cavsumo.scene import Scene
+from cavsumo.setting import prepare
 from cavsumo.simulator import play
 from cavsumo.snapshot import BodyState, Snapshot
 from cavsumo.theatre import Theatre
@@ -289,7 +289,7 @@ def serve(pipe: Connection, setup: Setup, first: int, count: int) -> None:
         },
         "benchmark",
     )
-    with Theatre(plan, prepare(plan)) as theatre:
+    with Theatre(plan, prepare(plan).site) as theatre:
         watch = theatre.stage.assertions[0]
         assert isinstance(watch, Watch)
         agents = make_agents(plan, setup.agent)

@@ -1,167 +1,147 @@
-"""Many episodes, each in a process that may die: a crash or a hang costs one row, never more.
+"""Many episodes over any executor, their outcomes in the order of their numbers.
 
-SUMO can end the whole process (segmentation fault) or never come back (endless loop), so the
-parent only waits on a pipe with a deadline, and replaces a worker that is gone.
+Whatever finishes first and wherever it was played, what comes out is the same. Episodes are
+independent of each other, but for agents that learn: those take their memory along from one of
+their episodes to the next, so they learn in sequence while the episodes of others fill the
+executor. What was learned can then be played in parallel (``learn=false``).
 """
 
 from __future__ import annotations
 
-import multiprocessing
-import os
-import signal
-import sys
-import tempfile
-import time
-from collections.abc import Iterator
-from multiprocessing.connection import Connection
-from pathlib import Path
+from collections import deque
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from concurrent.futures import (
+    FIRST_COMPLETED,
+    BrokenExecutor,
+    CancelledError,
+    Executor,
+    Future,
+    wait,
+)
+from dataclasses import dataclass
 from typing import Any
 
-from cavsumo.errors import CavsumoError, InputError
-from cavsumo.jobs import Job, failed, job
-from cavsumo.outcomes import Outcome
-from cavsumo.scenario import BatchPlan
-from cavsumo.site import Site
+from cavsumo.errors import BatchError, CavsumoError
+from cavsumo.jobs import failed, job, learners
+from cavsumo.setting import Setting
+from cavsumo.worker import Answer, play
 
-STARTUP_S = 120.0  # imports and SUMO's first start, on a slow machine
-CONTEXT = multiprocessing.get_context("spawn")
+POLL_S = 0.2  # how often to look whether to stop, while nothing finishes
 
 
-def run_batch(plan: BatchPlan, worker: Worker) -> Iterator[tuple[Outcome, Any]]:
-    """The outcomes of a batch in run order, with what the agents know after each.
+def run_batch(
+    setting: Setting,
+    executor: Executor,
+    todo: Iterable[int],
+    *,
+    memories: Mapping[str, Any] | None = None,
+    ahead: int = 16,
+    stopped: Callable[[], bool] = lambda: False,
+) -> Iterator[Answer]:
+    """The outcomes of a batch in the order of ``todo``, with what the agents know after each.
 
-    Learning agents take their memory along from one of their episodes to the next, through the
-    parent, so that a worker's death loses one episode and not the training.
+    Closing the iterator gives up what has not come out yet.
+
+    Args:
+        executor: plays jobs by ``cavsumo.worker.play``, in threads or in processes anywhere.
+        todo: numbers of episodes, ascending.
+        memories: what learning agents know already, by name.
+        ahead: how many episodes to have under way or waiting for their turn to come out.
+        stopped: asked all the time; once true, what runs is finished and nothing more is begun.
     """
-    memories: dict[str, Any] = {}
-    for run in range(plan.runs * len(plan.agents)):
-        name = plan.agents[run % len(plan.agents)]
-        outcome, memories[name] = worker.play(job(plan, run, memories.get(name)))
-        yield outcome, memories[name]
-
-
-class Worker:
-    """A process with one SUMO in it, replaced when it dies; a context manager.
-
-    Raises InputError on entering when the plan cannot be set up at all.
-    """
-
-    def __init__(self, plan: BatchPlan, site: Site) -> None:
-        self.plan, self.site = plan, site
-        self._process: Any = None
-
-    def __enter__(self) -> Worker:
-        self._log = tempfile.NamedTemporaryFile(prefix="cavsumo-worker-", suffix=".log")
-        self._start()
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self._stop()
-        self._log.close()
-
-    def play(self, job: Job) -> tuple[Outcome, Any]:
-        """The outcome of a job and the agents' memory after it; never raises for its crash."""
-        begun = time.perf_counter()
-        try:
-            if self._process is None:
-                self._start()
-            self._send(job)
-            answer: tuple[Outcome, Any] = self._receive(self.plan.deadline_s)
-            return answer
-        except _WorkerGone as gone:
-            self._stop()
-            wall = time.perf_counter() - begun
-            return failed(self.plan, job, str(gone), wall), job.memory
-
-    def _start(self) -> None:
-        """Start the process and wait until it has rehearsed."""
-        self._pipe, theirs = CONTEXT.Pipe()
-        self._process = CONTEXT.Process(
-            target=_serve, args=(theirs, self.plan, self.site, self._log.name), daemon=True
-        )
-        self._process.start()
-        theirs.close()  # so that its death is seen as the end of the pipe
-        try:
-            refusal = self._receive(STARTUP_S)
-        except _WorkerGone as gone:
-            self._stop()
-            raise InputError(f"SUMO cannot load this scenario: {gone}") from gone
-        if refusal is not None:
-            self._stop()
-            raise InputError(refusal)
-
-    def _send(self, job: Job) -> None:
-        """Hand over a job; _WorkerGone when there is nobody to take it."""
-        try:
-            self._pipe.send(job)
-        except OSError:
-            self._process.join(5.0)
-            raise _WorkerGone(_end_of(self._process.exitcode)) from None
-
-    def _receive(self, deadline: float) -> Any:
-        """What the process sends, or _WorkerGone when it died or took too long."""
-        try:
-            if self._pipe.poll(deadline):
-                return self._pipe.recv()
-        except (EOFError, OSError):
-            self._process.join(5.0)
-            raise _WorkerGone(_end_of(self._process.exitcode) + self._last_words()) from None
-        raise _WorkerGone(f"no answer within {deadline:g} s, killed")
-
-    def _last_words(self) -> str:
-        """The last line that the process printed below Python."""
-        text = Path(self._log.name).read_text(encoding="utf-8", errors="replace")
-        lines = [line.strip() for line in text.splitlines() if line.strip()]
-        return f" ({lines[-1]})" if lines else ""
-
-    def _stop(self) -> None:
-        """End the process, by force if it does not go by itself."""
-        if self._process is None:
-            return
-        self._pipe.close()
-        self._process.join(2.0)
-        if self._process.is_alive():
-            self._process.kill()
-            self._process.join(10.0)
-        self._process = None
-
-
-class _WorkerGone(Exception):
-    """The worker died or was killed; the message says how."""
-
-
-def _end_of(exitcode: int | None) -> str:
-    """How a process ended, in words."""
-    if exitcode is not None and exitcode < 0:
-        return f"the simulation process died of {signal.Signals(-exitcode).name}"
-    return f"the simulation process ended with status {exitcode}"
-
-
-def _serve(pipe: Connection, plan: BatchPlan, site: Site, log: str) -> None:
-    """The worker: rehearse once, then play jobs until the pipe closes."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # the parent decides what Ctrl-C means
-    _divert_output(log)
-    from cavsumo.theatre import Theatre
-
+    line = _Line(setting, executor, dict(memories or {}))
+    runs = iter(todo)
     try:
-        theatre = Theatre(plan, site)
-        theatre.rehearse()
-    except CavsumoError as error:
-        pipe.send(str(error))
-        return
-    pipe.send(None)
-    with theatre:
         while True:
-            try:
-                job = pipe.recv()
-            except EOFError:
+            if stopped():
+                line.call_off()
+            else:
+                line.join(runs, ahead)
+            if not line.entries:
                 return
-            pipe.send(theatre.play(job))
+            line.advance()
+            yield from line.ready()
+    finally:
+        line.call_off()
 
 
-def _divert_output(log: str) -> None:
-    """Send what SUMO prints to a file; what Python prints goes to the real stderr."""
-    sys.stdout = sys.stderr = os.fdopen(os.dup(2), "w", buffering=1)
-    sink = os.open(log, os.O_WRONLY | os.O_TRUNC)
-    os.dup2(sink, 1)
-    os.dup2(sink, 2)
+@dataclass
+class _Entry:
+    """An episode between being asked for and coming out."""
+
+    run: int
+    agent: str
+    future: Future[Answer] | None = None
+    answer: Answer | None = None
+
+
+class _Line:
+    """Episodes in the order in which they come out; each is submitted as soon as it can be."""
+
+    def __init__(self, setting: Setting, executor: Executor, memories: dict[str, Any]) -> None:
+        self.setting, self.executor, self.memories = setting, executor, memories
+        self.entries: deque[_Entry] = deque()
+        self._learners = learners(setting.plan)
+
+    def join(self, runs: Iterator[int], ahead: int) -> None:
+        """Take up episodes until so many are in line, and submit those that can start."""
+        agents = self.setting.plan.agents
+        while len(self.entries) < ahead and (run := next(runs, None)) is not None:
+            self.entries.append(_Entry(run, agents[run % len(agents)]))
+        learning = set()
+        for entry in self.entries:
+            if entry.answer is None and entry.agent in self._learners:
+                if entry.agent in learning:
+                    continue  # its turn comes when it knows what the episode before teaches
+                learning.add(entry.agent)
+            if entry.future is None:
+                self._submit(entry)
+
+    def advance(self) -> None:
+        """Wait a moment for something to finish."""
+        waiting = [e for e in self.entries if e.future is not None and e.answer is None]
+        wait([e.future for e in waiting if e.future], POLL_S, return_when=FIRST_COMPLETED)
+        for entry in waiting:
+            if entry.future is not None and entry.future.done():
+                entry.answer = self._answer(entry, entry.future)
+                if entry.agent in self._learners:
+                    self.memories[entry.agent] = entry.answer[1]
+
+    def ready(self) -> Iterator[Answer]:
+        """What can come out: all that is finished before the first that is not."""
+        while self.entries and (answer := self.entries[0].answer) is not None:
+            self.entries.popleft()
+            yield answer
+
+    def call_off(self) -> None:
+        """Drop what has not started, and what would come out behind it."""
+        for place, entry in enumerate(self.entries):
+            if entry.answer is None and (entry.future is None or entry.future.cancel()):
+                for later in list(self.entries)[place:]:
+                    if later.future is not None:
+                        later.future.cancel()
+                while len(self.entries) > place:
+                    self.entries.pop()
+                return
+
+    def _submit(self, entry: _Entry) -> None:
+        """Hand an episode to the executor."""
+        work = job(self.setting.plan, entry.run, self.memories.get(entry.agent))
+        try:
+            entry.future = self.executor.submit(play, self.setting, work)
+        except RuntimeError as error:  # as executors say that they are shut down or broken
+            raise BatchError(f"the executor takes no more episodes: {error}") from error
+
+    def _answer(self, entry: _Entry, future: Future[Answer]) -> Answer:
+        """The answer of an episode; what the executor lost is an error of that episode."""
+        try:
+            return future.result()
+        except (CancelledError, BrokenExecutor, OSError) as error:
+            said = f"{type(error).__name__} {error}".strip()
+            raise BatchError(f"the executor is gone: {said}") from error
+        except CavsumoError:
+            raise
+        except Exception as error:  # such as dask's KilledWorker
+            work = job(self.setting.plan, entry.run, self.memories.get(entry.agent))
+            said = f"the executor lost it: {type(error).__name__}: {error}"
+            return failed(self.setting.plan, work, said, 0.0), work.memory

@@ -3,18 +3,20 @@
 from __future__ import annotations
 
 import argparse
+import dataclasses
 import sys
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, NoReturn
 
 from cavsumo import __version__
-from cavsumo.errors import CavsumoError, Exit, InputError
+from cavsumo.errors import BatchError, CavsumoError, Exit, InputError
 
 # Settings that the command line takes over as they are.
 PLAIN = (
     "net routes ego junction agents runs seed end step_length testers kind bodies_per_agent "
-    "embodiment sumo_width start_speed trace assertions"
+    "embodiment sumo_width start_speed trace assertions "
+    "shard first until_tests until_half_width until_rate"
 ).split()
 
 
@@ -26,7 +28,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         return status
     except CavsumoError as error:
         print(f"cavsumo: {error}", file=sys.stderr)
-        return Exit.USAGE
+        return Exit.NOT_RUN if isinstance(error, BatchError) else Exit.USAGE
     except BrokenPipeError:
         return Exit.OK
     except KeyboardInterrupt:
@@ -51,6 +53,7 @@ def _parser() -> argparse.ArgumentParser:
     commands = parser.add_subparsers(title="commands", required=True, metavar="COMMAND")
     _add_run(commands)
     _add_replay(commands)
+    _add_merge(commands)
     for sort, text in (
         ("agents", "list the tester agents"),
         ("egos", "list the vehicles under test"),
@@ -80,6 +83,8 @@ def _add_run(commands: Any) -> None:
     batch.add_argument(
         "--deadline", type=float, metavar="S", help="real time an episode may take (default 120)"
     )
+    _add_means(run.add_argument_group("processes"))
+    _add_stopping(run.add_argument_group("stopping early"))
     output = run.add_argument_group("output")
     output.add_argument(
         "-o", "--output", default="results.csv", metavar="FILE", help="default results.csv"
@@ -87,9 +92,40 @@ def _add_run(commands: Any) -> None:
     output.add_argument(
         "--trace", choices=("none", "tests", "all"), help="frames to keep (default tests)"
     )
+    output.add_argument(
+        "--resume", action="store_true", help="go on where the results end, or start"
+    )
+    output.add_argument(
+        "--retry-errors", action="store_true", help="play the episodes again that ended in errors"
+    )
+    output.add_argument(
+        "--overwrite", action="store_true", help="start again in place of an unfinished batch"
+    )
     output.add_argument("--exit-zero", action="store_true", help="a violation is no failure")
     output.add_argument("-q", "--quiet", action="store_true", help="no progress, no summary")
     run.set_defaults(command=_run)
+
+
+def _add_means(group: Any) -> None:
+    add = group.add_argument
+    add("-j", "--jobs", type=int, metavar="N", help="episodes at a time (default 1)")
+    add("--executor", choices=("local", "dask"), default="local", help="default local")
+    add("--scheduler", metavar="ADDRESS", help="address of dask's scheduler")
+    add("--shard", metavar="I/N", help="play part I of N; cavsumo merge puts them together")
+
+
+def _add_stopping(group: Any) -> None:
+    add = group.add_argument
+    switch = argparse.BooleanOptionalAction
+    add("-x", "--first", action=switch, default=None, help="stop at the first failure")
+    add("--until-tests", type=int, metavar="N", help="stop after N tests")
+    add(
+        "--until-half-width",
+        metavar="H",
+        help="stop when every agent's rate is known to H, such as 0.02, or 10%% of the rate",
+    )
+    add("--until-rate", choices=("tests", "failures"), help="the rate meant (default tests)")
+    add("--budget", type=float, metavar="S", help="stop after S seconds of real time")
 
 
 def _add_scenario(group: Any) -> None:
@@ -141,16 +177,39 @@ def _add_replay(commands: Any) -> None:
     replay.set_defaults(command=_replay)
 
 
-def _run(options: argparse.Namespace) -> int:
-    from cavsumo.commands import run
+def _add_merge(commands: Any) -> None:
+    merge = commands.add_parser(
+        "merge",
+        help="put the results of shards together",
+        description="Put the results of shards together: the same file as one run would give.",
+        allow_abbrev=False,
+    )
+    merge.add_argument("parts", nargs="+", type=Path, metavar="PART", help="the CSV of a shard")
+    merge.add_argument("-o", "--output", required=True, type=Path, metavar="FILE")
+    merge.add_argument("--overwrite", action="store_true", help="in place of an unfinished batch")
+    merge.add_argument("-q", "--quiet", action="store_true", help="no summary")
+    merge.set_defaults(command=_merge)
 
-    return run(_settings(options), Path(options.output), options.quiet, options.exit_zero)
+
+def _run(options: argparse.Namespace) -> int:
+    from cavsumo.commands.run import Manner, run
+    from cavsumo.executors import Means
+
+    manner = Manner(**{f.name: getattr(options, f.name) for f in dataclasses.fields(Manner)})
+    means = Means(options.jobs, options.executor, options.scheduler)
+    return run(_settings(options), Path(options.output), means, manner)
 
 
 def _replay(options: argparse.Namespace) -> int:
-    from cavsumo.commands import replay
+    from cavsumo.commands.replay import replay
 
     return replay(options.results, options.run)
+
+
+def _merge(options: argparse.Namespace) -> int:
+    from cavsumo.commands.merge import merge
+
+    return merge(options.parts, options.output, options.overwrite, options.quiet)
 
 
 def _list(options: argparse.Namespace) -> int:
@@ -166,7 +225,7 @@ def _settings(options: argparse.Namespace) -> dict[str, Any]:
 
     settings = read_config(Path(options.config)) if options.config else {}
     given = {key: getattr(options, key) for key in PLAIN}
-    given["deadline_s"] = options.deadline
+    given["deadline_s"], given["budget_s"] = options.deadline, options.budget
     if options.ego_route is not None:
         given["ego_route"] = options.ego_route.replace(",", " ").split()
         if not given["ego_route"]:

@@ -10,6 +10,7 @@
     |-- EgoError                the ego's controller raised or gave an answer that is none
     |-- AgentError              a tester agent raised or chose an action outside its space
     |-- SimulationError         SUMO refused a call, or the ego never entered the network
+    |-- BatchError              a batch cannot go on; what ran is kept (exit status 3)
     `-- ResultsError            results on disk are missing, foreign or damaged (exit status 2)
 """
 
@@ -65,6 +66,10 @@ class AgentError(CavsumoError):
 
 class SimulationError(CavsumoError):
     """SUMO refused a call, or the ego never entered the network."""
+
+
+class BatchError(CavsumoError):
+    """A batch cannot go on: a full disk, a lost scheduler, no process to simulate in."""
 
 
 class ResultsError(InputError):

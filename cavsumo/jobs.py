@@ -56,6 +56,11 @@ def make_agents(plan: BatchPlan, name: str) -> list[Agent]:
     return [AGENTS.make(name, params) for _ in teams(plan.scenario)]
 
 
+def learners(plan: BatchPlan) -> frozenset[str]:
+    """The names of the agents that learn from episode to episode."""
+    return frozenset(n for n in plan.agents if any(a.learns for a in make_agents(plan, n)))
+
+
 def teams(scenario: Scenario) -> tuple[tuple[int, ...], ...]:
     """For each agent the indices of the bodies that it owns."""
     size = scenario.bodies_per_agent
@@ -72,7 +77,7 @@ def tester_bodies(scenario: Scenario) -> tuple[Body, ...]:
 
 def failed(plan: BatchPlan, job: Job, message: str, wall: float) -> Outcome:
     """The outcome of an episode that could not be played."""
-    return Outcome(head(plan, job) | {"outcome": "error", "error": message, "wall_s": wall}, [])
+    return Outcome(head(plan, job) | {"outcome": "error", "error": message, "wall_s": wall})
 
 
 def head(plan: BatchPlan, job: Job) -> Row:

@@ -1,21 +1,20 @@
-"""Rows, manifest and traces: how what happened is written, and read again."""
+"""What an episode leaves: its row in the CSV and the trace beside it, as text.
+
+Both are made where the episode was played, so that the process that collects them only writes.
+"""
 
 from __future__ import annotations
 
 import csv
+import io
 import json
 import math
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
-from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from cavsumo.assertions.base import VIOLATED
-from cavsumo.errors import ResultsError
 from cavsumo.snapshot import BodyState, Snapshot
-
-if TYPE_CHECKING:
-    import pandas
 
 # The columns of results.csv with their meaning, in order; interface of everything downstream.
 COLUMNS: Mapping[str, str] = {
@@ -54,25 +53,50 @@ COLUMNS: Mapping[str, str] = {
     "wall_s": "real time; the only column that is not reproducible",
 }
 Row = dict[str, Any]
-FORMAT = "cavsumo-results-1"
-FRAME_KEYS = {"step", "time_s", "ego", "steering", "testers", "background"}
 
 
 @dataclass(frozen=True)
 class Outcome:
-    """One finished episode: its row and the frames worth keeping."""
+    """One finished episode.
+
+    Attributes:
+        row: its row, by column.
+        trace: the frames worth keeping as JSON lines, empty for none.
+    """
 
     row: Row
-    frames: list[dict[str, Any]]
+    trace: str = ""
+
+    @property
+    def frames(self) -> list[dict[str, Any]]:
+        """The frames of the trace (parsed anew at each call)."""
+        return [json.loads(line) for line in self.trace.splitlines()[1:]]
 
 
 def cell(value: Any) -> str:
-    """A value as it stands in the CSV: empty for nothing, floats to three decimals."""
+    """A value as it stands in the CSV: empty for nothing, floats to three decimals.
+
+    Line breaks become spaces: a row is a line, so a torn one shows.
+    """
     if value is None or value == "":
         return ""
     if isinstance(value, float):
         return "" if not math.isfinite(value) else f"{value:.3f}".replace("-0.000", "0.000")
-    return str(value)
+    return " ".join(str(value).splitlines())
+
+
+def row_line(row: Mapping[str, Any]) -> str:
+    """A row as a line of the CSV, with its end."""
+    line = io.StringIO()
+    cells = [cell(row.get(column)) for column in COLUMNS]
+    csv.writer(line, lineterminator="\n").writerow(cells)
+    return line.getvalue()
+
+
+def trace_text(row: Row, frames: Iterable[Mapping[str, Any]]) -> str:
+    """A trace as JSON lines: the row's identity, then one frame a timestep."""
+    head = {key: row[key] for key in ("run", "agent", "ego", "seed", "outcome", "tester")}
+    return "".join(json.dumps(line, allow_nan=False) + "\n" for line in (head, *frames))
 
 
 def frame(snapshot: Snapshot) -> dict[str, Any]:
@@ -89,116 +113,6 @@ def frame(snapshot: Snapshot) -> dict[str, Any]:
 
 def _pose(state: BodyState) -> list[float]:
     return [state.x, state.y, state.v, state.o]
-
-
-class ResultsWriter:
-    """Writes a batch: manifest first and last, rows as they come, traces beside them."""
-
-    def __init__(self, csv_file: Path, manifest: Mapping[str, Any]) -> None:
-        if csv_file.suffix != ".csv":  # the manifest and the traces take the other names
-            raise ResultsError(f"results {str(csv_file)!r}: expected a name that ends in .csv")
-        self.csv_file = csv_file
-        self.manifest_file = csv_file.with_suffix(".json")
-        self.trace_folder = csv_file.with_suffix("")
-        self.traces = 0
-        self.manifest = dict(manifest)
-        try:
-            self._clear()
-            self._write_manifest("running")
-            self._stream = csv_file.open("w", encoding="utf-8", newline="")
-        except OSError as error:
-            raise ResultsError(
-                f"results {str(csv_file)!r}: cannot be written: {error.strerror}"
-            ) from error
-        self._csv = csv.writer(self._stream, lineterminator="\n")
-        self._csv.writerow(COLUMNS)
-
-    def write(self, outcome: Outcome) -> Row:
-        """Append a row, its trace first, so that no row names a trace that is not there."""
-        row = dict(outcome.row)
-        if outcome.frames:
-            name = f"run{row['run']:06d}.jsonl"
-            self.trace_folder.mkdir(exist_ok=True)
-            write_trace(self.trace_folder / name, row, outcome.frames)
-            row["trace"] = f"{self.trace_folder.name}/{name}"
-            self.traces += 1
-        self._csv.writerow([cell(row.get(column)) for column in COLUMNS])
-        self._stream.flush()
-        return row
-
-    def finish(self, status: str, facts: Mapping[str, Any]) -> None:
-        """Close the rows and complete the manifest."""
-        self._stream.close()
-        self.manifest.update(facts)
-        self._write_manifest(status)
-
-    def _clear(self) -> None:
-        """Remove the traces of an earlier batch of the same name, and nothing else."""
-        if self.trace_folder.is_dir():
-            for old in self.trace_folder.glob("run*.jsonl"):
-                if old.stem.removeprefix("run").isdecimal():
-                    old.unlink()
-
-    def _write_manifest(self, status: str) -> None:
-        data = {"format": FORMAT, "status": status, **self.manifest, "columns": dict(COLUMNS)}
-        text = json.dumps(data, indent=1, ensure_ascii=False, allow_nan=False)
-        self.manifest_file.write_text(text + "\n", encoding="utf-8")
-
-
-def write_trace(file: Path, row: Row, frames: Iterable[Mapping[str, Any]]) -> None:
-    """A trace as JSON lines: the row's identity, then one frame a timestep."""
-    head = {key: row[key] for key in ("run", "agent", "ego", "seed", "outcome", "tester")}
-    with file.open("w", encoding="utf-8") as stream:
-        for line in (head, *frames):
-            stream.write(json.dumps(line, allow_nan=False) + "\n")
-
-
-def read_trace(file: Path) -> list[dict[str, Any]]:
-    """The frames of a trace."""
-    try:
-        lines = file.read_text(encoding="utf-8").splitlines()
-        frames = [json.loads(line) for line in lines[1:]]
-        for found in frames:
-            if not set(found) >= FRAME_KEYS:
-                raise ValueError(f"a frame without {', '.join(sorted(FRAME_KEYS - set(found)))}")
-        return frames
-    except (OSError, ValueError, TypeError) as error:
-        raise ResultsError(f"trace {str(file)!r}: cannot be read: {error}") from error
-
-
-def read_manifest(csv_file: Path) -> dict[str, Any]:
-    """The manifest that belongs to a results file."""
-    file = csv_file.with_suffix(".json")
-    try:
-        data = json.loads(file.read_text(encoding="utf-8"))
-    except (OSError, json.JSONDecodeError) as error:
-        raise ResultsError(f"manifest {str(file)!r}: cannot be read: {error}") from error
-    if not isinstance(data, dict) or data.get("format") != FORMAT:
-        raise ResultsError(f"manifest {str(file)!r}: is not of the format {FORMAT}")
-    return data
-
-
-def read_rows(csv_file: Path) -> list[dict[str, str]]:
-    """The rows of a results file, as text."""
-    try:
-        with csv_file.open(encoding="utf-8", newline="") as stream:
-            reader = csv.DictReader(stream)
-            missing = [column for column in COLUMNS if column not in (reader.fieldnames or ())]
-            if missing:
-                raise ResultsError(f"results {str(csv_file)!r}: no column {missing[0]!r}")
-            return list(reader)
-    except (OSError, UnicodeDecodeError, csv.Error) as error:
-        raise ResultsError(f"results {str(csv_file)!r}: cannot be read: {error}") from error
-
-
-def read_results(csv_file: Path) -> pandas.DataFrame:
-    """The rows as a pandas table, numbers as numbers."""
-    import pandas
-
-    try:
-        return pandas.read_csv(csv_file)
-    except (OSError, ValueError) as error:
-        raise ResultsError(f"results {str(csv_file)!r}: cannot be read: {error}") from error
 
 
 def is_failure(row: Mapping[str, Any]) -> bool:

@@ -3,21 +3,26 @@
 from __future__ import annotations
 
 import sys
-from collections import Counter
+import time
 
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, TextColumn, TimeRemainingColumn
 from rich.progress import Progress as Bar
 
-from cavsumo.outcomes import Row
+from cavsumo.tally import Tally
 
 
 class Progress:
-    """Counts episodes, tests and failures; a context manager."""
+    """Episodes, rate, time left, and what was found; a context manager.
 
-    def __init__(self, total: int, quiet: bool) -> None:
-        self.total, self.done = total, 0
-        self.counts: Counter[str] = Counter()
+    Args:
+        total: how many episodes there are at most.
+        done: how many of them were played before.
+    """
+
+    def __init__(self, total: int, quiet: bool, done: int = 0) -> None:
+        self.total, self.done, self.before = total, done, done
+        self._begun = time.monotonic()
         terminal = sys.stderr.isatty()
         self._lines = not quiet and not terminal
         self._bar = Bar(
@@ -33,24 +38,36 @@ class Progress:
 
     def __enter__(self) -> Progress:
         self._bar.start()
-        self._task = self._bar.add_task("", total=self.total)
+        self._task = self._bar.add_task("", total=self.total, completed=self.done)
         return self
 
     def __exit__(self, *_: object) -> None:
         self._bar.stop()
 
-    def update(self, row: Row) -> None:
-        """Count one more episode."""
+    def update(self, tally: Tally) -> None:
+        """One more episode was played."""
         self.done += 1
-        self.counts[row["outcome"]] += 1
-        self._bar.update(self._task, advance=1, description=self._found())
-        tenth = max(1, self.total // 10)
-        if self._lines and (self.done % tenth == 0 or self.done == self.total):
-            print(f"{self.done}/{self.total} episodes, {self._found()}", file=sys.stderr)
+        rate = (self.done - self.before) / max(1e-9, time.monotonic() - self._begun)
+        said = f"{rate:.1f}/s, {_found(tally)}"
+        self._bar.update(self._task, advance=1, description=said)
+        if self._lines and self._at_a_tenth():
+            left = _duration((self.total - self.done) / rate)
+            print(f"{self.done}/{self.total} episodes, {left} left, {said}", file=sys.stderr)
 
-    def _found(self) -> str:
-        """What was found so far."""
-        tests = self.counts["violated"] + self.counts["held"]
-        found = f"{tests} tests, {self.counts['violated']} failures"
-        errors = self.counts["error"]
-        return f"{found}, {errors} errors" if errors else found
+    def _at_a_tenth(self) -> bool:
+        """Whether a tenth of the whole has just been completed."""
+        return self.done * 10 // self.total > (self.done - 1) * 10 // self.total
+
+
+def _found(tally: Tally) -> str:
+    """What was found so far."""
+    found = tally.all
+    said = f"{found.tests} tests, {found.failures} failures"
+    return f"{said}, {found.errors} errors" if found.errors else said
+
+
+def _duration(seconds: float) -> str:
+    """Minutes and seconds, hours if there are any."""
+    minutes, s = divmod(round(seconds), 60)
+    hours, m = divmod(minutes, 60)
+    return f"{hours}:{m:02}:{s:02}" if hours else f"{m}:{s:02}"

@@ -7,7 +7,8 @@ from pathlib import Path
 from typing import Any
 
 from cavsumo.errors import ResultsError
-from cavsumo.outcomes import COLUMNS, Row, cell, read_manifest, read_rows, read_trace
+from cavsumo.outcomes import COLUMNS, Row, cell
+from cavsumo.results import read_manifest, read_rows, read_trace
 from cavsumo.scenario import BatchPlan
 
 # Columns that a replay does not reproduce: real time, and the file beside the row.

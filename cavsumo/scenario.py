@@ -8,11 +8,17 @@ from __future__ import annotations
 
 import math
 import tomllib
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_validator
+from pydantic import (
+    BaseModel,
+    ConfigDict,
+    Field,
+    ValidationError,
+    field_validator,
+)
 
 from cavsumo.errors import InputError, UnknownName
 
@@ -79,6 +85,52 @@ class BatchPlan(BaseModel):
     seed: int = Field(1, ge=0, le=2**63 - 1)
     trace: Literal["none", "tests", "all"] = "tests"
     deadline_s: Finite = Field(120.0, gt=0)
+    shard: str | None = Field(None, description="part I/N of the episodes, I from 1 to N")
+    first: bool = Field(False, description="stop at the first failure")
+    until_tests: int | None = Field(None, ge=1, description="stop after so many tests")
+    until_half_width: str | None = Field(
+        None, description="stop when the rate's interval is that narrow: 0.02, or 10% of the rate"
+    )
+    until_rate: Literal["tests", "failures"] = Field(
+        "tests", description="the rate meant: tests among episodes, or failures among tests"
+    )
+    budget_s: Finite | None = Field(None, gt=0, description="stop after so much real time [s]")
+
+    @field_validator("until_half_width", mode="before")
+    @classmethod
+    def _as_text(cls, value: Any) -> Any:
+        """A number in a scenario file means the same as on the command line."""
+        return f"{value}" if isinstance(value, int | float) else value
+
+    @field_validator("until_half_width")
+    @classmethod
+    def _a_half_width(cls, value: str | None) -> str | None:
+        if value is not None:
+            half_width(value)
+        return value
+
+    @field_validator("shard")
+    @classmethod
+    def _a_part(cls, value: str | None) -> str | None:
+        if value is not None:
+            part_of(value)
+        return value
+
+    def todo(self) -> Iterator[int]:
+        """The numbers of the episodes, those of the shard only if there is one.
+
+        Shards take turns episode by episode, each with all agents.
+        """
+        part, parts = part_of(self.shard) if self.shard else (1, 1)
+        agents = len(self.agents)
+        for episode in range(part - 1, self.runs, parts):
+            yield from range(episode * agents, (episode + 1) * agents)
+
+    @property
+    def size(self) -> int:
+        """How many episodes that are."""
+        part, parts = part_of(self.shard) if self.shard else (1, 1)
+        return len(range(part - 1, self.runs, parts)) * len(self.agents)
 
     def agent_params(self, agent: str, known: Mapping[str, list[str]]) -> Params:
         """The parameters meant for one agent: its own (``agent.key``) and those it knows."""
@@ -87,6 +139,26 @@ class BatchPlan(BaseModel):
         return mine | {
             k.removeprefix(prefix): v for k, v in self.params.items() if k.startswith(prefix)
         }
+
+
+def half_width(text: str) -> tuple[float, bool]:
+    """A half-width as a number and whether it is relative: ``0.02``, or ``10%`` of the rate."""
+    relative = text.endswith("%")
+    try:
+        value = float(text.removesuffix("%")) / (100.0 if relative else 1.0)
+    except ValueError:
+        value = math.nan
+    if not 0.0 < value < 1.0:
+        raise ValueError("must be a share such as 0.02, or one of the rate such as 10%")
+    return value, relative
+
+
+def part_of(text: str) -> tuple[int, int]:
+    """A shard ``I/N`` as two numbers, 1 <= I <= N."""
+    part, _, parts = text.partition("/")
+    if not (part.isdecimal() and parts.isdecimal() and 1 <= int(part) <= int(parts)):
+        raise ValueError("must be I/N with 1 <= I <= N, such as 2/8")
+    return int(part), int(parts)
 
 
 SCENARIO_KEYS = frozenset(Scenario.model_fields)
@@ -127,6 +199,11 @@ def plan_from(settings: Mapping[str, Any], source: str) -> BatchPlan:
     for file in (plan.scenario.routes, *plan.scenario.additional):
         if file is not None and not file.is_file():
             raise InputError(f"{source}: no such file: {str(file)!r}")
+    if plan.shard and (plan.first or plan.until_tests or plan.until_half_width):
+        raise InputError(
+            f"{source}: a shard sees its own rows only; first, until_tests and until_half_width "
+            "need the whole batch"
+        )
     if plan.scenario.testers % plan.scenario.bodies_per_agent:
         raise InputError(
             f"{source}: bodies_per_agent {plan.scenario.bodies_per_agent} does not divide "

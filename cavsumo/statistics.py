@@ -2,17 +2,18 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 
 @dataclass(frozen=True, slots=True)
 class Rate:
-    """A share with its 95 % Wilson interval.
+    """A share with a 95 % interval.
 
     Attributes:
         count, total: successes among trials.
         value: count / total, None when there were no trials.
-        low, high: the interval (Wilson 1927, by scipy), None when there were no trials.
+        low, high: the interval, None when there were no trials.
     """
 
     count: int
@@ -29,10 +30,35 @@ class Rate:
 
 
 def rate(count: int, total: int) -> Rate:
-    """The share of count among total."""
+    """The share of count among total, with its Wilson interval (Wilson 1927, by scipy)."""
     if total == 0:
         return Rate(count, total, None, None, None)
     from scipy.stats import binomtest
 
     interval = binomtest(count, total).proportion_ci(0.95, method="wilson")
     return Rate(count, total, count / total, float(interval.low), float(interval.high))
+
+
+def sequential_rate(count: int, total: int) -> Rate:
+    """The share of count among total, with an interval that holds however one decides to stop.
+
+    The beta-binomial confidence sequence (Robbins 1970, Ann. Math. Stat. 41, 1397; Howard et al.
+    2021, Ann. Stat. 49, 1055): with independent trials of probability p the ratio of the mixed
+    likelihood, over a Beta(1/2, 1/2) prior, to that of p is a martingale, and exceeds 20 at any
+    time with probability at most 5 % (Ville). The interval holds the p where it does not.
+    """
+    if total == 0:
+        return Rate(count, total, None, None, None)
+    from scipy.optimize import brentq
+    from scipy.special import betaln, xlog1py, xlogy
+
+    mixed = betaln(0.5 + count, 0.5 + total - count) - betaln(0.5, 0.5)
+
+    def excess(p: float) -> float:
+        likelihood = xlogy(count, p) + xlog1py(total - count, -p)
+        return float(mixed - likelihood - math.log(20.0))
+
+    share, edge = count / total, 1e-12
+    low = float(brentq(excess, edge, share)) if count and excess(edge) > 0 else 0.0
+    high = float(brentq(excess, share, 1 - edge)) if count < total and excess(1 - edge) > 0 else 1.0
+    return Rate(count, total, share, low, high)

@@ -11,7 +11,7 @@ from cavsumo.assertions import ASSERTIONS
 from cavsumo.egos import make_ego
 from cavsumo.errors import CavsumoError
 from cavsumo.jobs import Job, episode_seed, failed, head, make_agents, teams, tester_bodies
-from cavsumo.outcomes import Outcome, Row, frame
+from cavsumo.outcomes import Outcome, Row, frame, trace_text
 from cavsumo.scenario import BatchPlan
 from cavsumo.simulator import Episode, Stage, play
 from cavsumo.site import Site
@@ -58,12 +58,13 @@ class Theatre:
                 self.stage, agents, job.seed, record=job.record or self.plan.trace != "none"
             )
             row = _row(self.plan, job, episode)
+            trace = self._trace(job, row, episode)
             memory = _recall(agents)
         except Exception as error:  # whatever it is, it costs this row and no other
             said = str(error) if isinstance(error, CavsumoError) else f"defect: {error!r}"
             return failed(self.plan, job, said, time.perf_counter() - begun), job.memory
         row["wall_s"] = time.perf_counter() - begun
-        return Outcome(row, self._kept(job, episode)), memory
+        return Outcome(row, trace), memory
 
     def _cast(self, job: Job) -> list[Agent]:
         """The agents of a job, with their memory."""
@@ -76,11 +77,11 @@ class Theatre:
             agent.remember(memory)
         return agents
 
-    def _kept(self, job: Job, episode: Episode) -> list[dict[str, Any]]:
+    def _trace(self, job: Job, row: Row, episode: Episode) -> str:
         """The frames worth keeping: of tests found, or of every episode if asked."""
         if job.record or (self.plan.trace == "tests" and episode.judgement.triggered):
-            return [frame(s) for s in episode.frames]
-        return []
+            return trace_text(row, map(frame, episode.frames))
+        return ""
 
 
 def _row(plan: BatchPlan, job: Job, episode: Episode) -> Row:

@@ -14,12 +14,12 @@ from shapely.geometry import LineString, box
 
 from cavsumo.agents.base import Scene
 from cavsumo.bodies import PEDESTRIAN, Body, Kind
-from cavsumo.commands import prepare
 from cavsumo.egos import make_ego
 from cavsumo.egos.base import EGO_KIND
 from cavsumo.paths import Path as Polyline
 from cavsumo.roads import Roads, Start
 from cavsumo.scenario import BatchPlan, plan_from
+from cavsumo.setting import Setting, checksums, prepare, versions
 from cavsumo.site import Site
 from cavsumo.snapshot import BodyState, Snapshot
 from cavsumo.world import World
@@ -62,10 +62,21 @@ def staged(networks: dict[str, Path]) -> Callable[..., tuple[BatchPlan, Site]]:
         s = plan.scenario
         key = (s.net, s.ego_route, s.junction, s.ego, repr(sorted(s.ego_params.items())))
         if key not in sites:
-            sites[key] = prepare(plan)
+            sites[key] = prepare(plan).site
         return plan, sites[key]
 
     return stage
+
+
+@pytest.fixture(scope="session")
+def set_up(staged: Callable[..., tuple[BatchPlan, Site]]) -> Callable[..., Setting]:
+    """Call like ``staged`` for all that a process needs to play."""
+
+    def made(name: str = "pedestrians", **settings: Any) -> Setting:
+        plan, site = staged(name, **settings)
+        return Setting(plan, site, str(Path.cwd()), checksums(plan), versions())
+
+    return made
 
 
 @pytest.fixture(scope="session")

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import multiprocessing
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -10,14 +9,15 @@ from typing import Any
 
 import pytest
 
-from cavsumo.batch import Worker, run_batch
+from cavsumo.batch import run_batch
 from cavsumo.errors import InputError
+from cavsumo.executors import local_executor
 from cavsumo.jobs import episode_seed, job
 from cavsumo.outcomes import Outcome
-from cavsumo.scenario import BatchPlan
-from cavsumo.site import Site
+from cavsumo.setting import Setting
+from cavsumo.worker import Answer, Worker
 
-Staged = Callable[..., tuple[BatchPlan, Site]]
+SetUp = Callable[..., Setting]
 Row = dict[str, Any]
 
 # Fails in the episode whose first tester starts at x = doom: kills its process, hangs, or raises.
@@ -47,10 +47,15 @@ class Mishap:
 DOOMED = 2  # the episode that fails
 
 
-def played(plan: BatchPlan, site: Site) -> list[Outcome]:
-    """The outcomes of a batch in a worker of its own."""
-    with Worker(plan, site) as worker:
-        return [outcome for outcome, _ in run_batch(plan, worker)]
+def answers(setting: Setting, jobs: int = 1) -> list[Answer]:
+    """The outcomes of a batch in processes of its own, with what the agents know after each."""
+    with local_executor(jobs) as executor:
+        return list(run_batch(setting, executor, setting.plan.todo()))
+
+
+def played(setting: Setting) -> list[Outcome]:
+    """The outcomes of a batch."""
+    return [outcome for outcome, _ in answers(setting)]
 
 
 def lasting(outcome: Outcome) -> Row:
@@ -62,23 +67,23 @@ def lasting(outcome: Outcome) -> Row:
 class Trial:
     """Plays the batch in which the doomed episode fails in some way, and the quiet one."""
 
-    plan: Callable[..., tuple[BatchPlan, Site]]
+    set_up: SetUp
     quiet: list[Row]
     doom: float
 
     def rows(self, how: str) -> list[Row]:
         """The rows of the batch in which it fails."""
-        return [lasting(o) for o in played(*self.plan(how=how, doom=self.doom))]
+        return [lasting(o) for o in played(self.set_up(how=how, doom=self.doom))]
 
 
 @pytest.fixture(scope="module")
-def trial(staged: Staged, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Trial]:
+def trial(set_up: SetUp, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Trial]:
     """The undisturbed batch, played once, and how to disturb it."""
     folder = tmp_path_factory.mktemp("controllers")
     (folder / "mishap_controller.py").write_text(MISHAP, encoding="utf-8")
 
-    def plan(agent: str = "random", **params: Any) -> tuple[BatchPlan, Site]:
-        return staged(
+    def doomed(agent: str = "random", **params: Any) -> Setting:
+        return set_up(
             ego="mishap_controller:Mishap",
             ego_params=params,
             agents=[agent],
@@ -90,9 +95,9 @@ def trial(staged: Staged, tmp_path_factory: pytest.TempPathFactory) -> Iterator[
 
     with pytest.MonkeyPatch.context() as patch:
         patch.syspath_prepend(str(folder))
-        outcomes = played(*plan())
+        outcomes = played(doomed())
         start = outcomes[DOOMED].frames[0]["testers"]["tester0"][0]
-        yield Trial(plan, [lasting(o) for o in outcomes], start)
+        yield Trial(doomed, [lasting(o) for o in outcomes], start)
 
 
 @pytest.mark.parametrize(
@@ -115,38 +120,14 @@ def test_an_episode_that_fails_costs_its_row_and_no_other(
     assert rows[:DOOMED] + rows[DOOMED + 1 :] == trial.quiet[:DOOMED] + trial.quiet[DOOMED + 1 :]
 
 
-def test_a_worker_killed_between_episodes_is_replaced(staged: Staged) -> None:
-    """Whoever kills the process while it waits costs one episode at most, never the batch."""
-    plan, site = staged(agents=["random"], runs=3, testers=1)
-    quiet = [lasting(o) for o in played(plan, site)]
-    with Worker(plan, site) as worker:
-        first, _ = worker.play(job(plan, 0))
-        for process in multiprocessing.active_children():
-            process.kill()
-            process.join()
-        second, _ = worker.play(job(plan, 1))
-        third, _ = worker.play(job(plan, 2))
-    assert lasting(first) == quiet[0]
-    assert second.row["outcome"] == "error" or lasting(second) == quiet[1]
-    assert lasting(third) == quiet[2]
-
-
-def test_no_process_is_left_behind(staged: Staged) -> None:
-    """When a batch is over, so are its processes."""
-    before = set(multiprocessing.active_children())
-    with Worker(*staged()):
-        assert set(multiprocessing.active_children()) > before
-    assert set(multiprocessing.active_children()) <= before
-
-
 def test_what_sumo_refuses_comes_out_before_the_first_episode(
-    staged: Staged, tmp_path: Path
+    set_up: SetUp, tmp_path: Path
 ) -> None:
     """A route file with an unknown edge: no worker, one message, in SUMO's own words."""
     file = tmp_path / "bad.rou.xml"
     file.write_text('<routes><trip id="a" depart="0" from="nowhere" to="westbound"/></routes>')
-    plan, site = staged(routes=file)
-    with pytest.raises(InputError, match="'nowhere'"), Worker(plan, site):
+    setting = set_up(routes=file)
+    with pytest.raises(InputError, match="'nowhere'"), Worker(setting):
         pytest.fail("the worker started")
 
 
@@ -156,29 +137,29 @@ PAIR = {"routes": "auto", "agents": ["random", "timing"], "trace": "all"}
 
 
 @pytest.fixture(scope="module")
-def recorded(staged: Staged) -> list[Outcome]:
+def recorded(set_up: SetUp) -> list[Outcome]:
     """Two episodes each of two agents on a real junction, with traffic and the default ego."""
-    return played(*staged("crossing", runs=2, **PAIR))
+    return played(set_up("crossing", runs=2, **PAIR))
 
 
 def test_the_same_plan_twice_gives_the_same_rows_and_frames(
-    staged: Staged, recorded: list[Outcome]
+    set_up: SetUp, recorded: list[Outcome]
 ) -> None:
     """In another process, with other hash seeds and addresses: only the real time differs."""
-    again = played(*staged("crossing", runs=2, **PAIR))
+    again = played(set_up("crossing", runs=2, **PAIR))
     assert [lasting(o) for o in again] == [lasting(o) for o in recorded]
     assert repr([o.frames for o in again]) == repr([o.frames for o in recorded])
     assert all(o.row["steps"] > 0 and o.frames[-1]["background"] for o in recorded)
 
 
 def test_an_episode_is_the_same_in_any_batch_and_order(
-    staged: Staged, recorded: list[Outcome]
+    set_up: SetUp, recorded: list[Outcome]
 ) -> None:
     """Run i stays what it is when more runs are asked for, and whatever was played before it."""
-    plan, site = staged("crossing", runs=5, **PAIR)
-    with Worker(plan, site) as worker:
+    setting = set_up("crossing", runs=5, **PAIR)
+    with Worker(setting) as worker:
         for run in (3, 0, 2, 1):
-            outcome, _ = worker.play(job(plan, run))
+            outcome, _ = worker.play(job(setting.plan, run))
             assert lasting(outcome) == lasting(recorded[run])
             assert repr(outcome.frames) == repr(recorded[run].frames)
 
@@ -200,18 +181,16 @@ SCHOOL = {"runs": 3, "testers": 2, "trace": "none", "end": 15.0}
 
 
 @pytest.fixture(scope="module")
-def learned(staged: Staged) -> list[Any]:
+def learned(set_up: SetUp) -> list[Any]:
     """What two Q-learning testers know after each of three episodes in one process."""
-    plan, site = staged(agents=["q-learning"], **SCHOOL)
-    with Worker(plan, site) as worker:
-        return [memory for _, memory in run_batch(plan, worker)]
+    return [memory for _, memory in answers(set_up(agents=["q-learning"], **SCHOOL))]
 
 
-def test_learning_goes_on_in_the_next_process(staged: Staged, learned: list[Any]) -> None:
+def test_learning_goes_on_in_the_next_process(set_up: SetUp, learned: list[Any]) -> None:
     """The weights are equal, whether one process played all episodes or another took over."""
-    plan, site = staged(agents=["q-learning"], **SCHOOL)
-    with Worker(plan, site) as worker:
-        outcome, memory = worker.play(job(plan, 2, learned[1]))
+    setting = set_up(agents=["q-learning"], **SCHOOL)
+    with Worker(setting) as worker:
+        outcome, memory = worker.play(job(setting.plan, 2, learned[1]))
     assert outcome.row["outcome"] != "error"
     assert memory == learned[2]
     assert [m["episodes"] for m in memory] == [3, 3]
@@ -221,18 +200,16 @@ def test_learning_goes_on_in_the_next_process(staged: Staged, learned: list[Any]
 
 def test_a_death_loses_one_episode_and_not_the_training(trial: Trial) -> None:
     """The process dies in the third episode: the fourth goes on from what the second taught."""
-    plan, site = trial.plan("q-learning", how="crash", doom=trial.doom)
-    with Worker(plan, site) as worker:
-        memories = [memory for _, memory in run_batch(plan, worker)]
+    setting = trial.set_up("q-learning", how="crash", doom=trial.doom)
+    memories = [memory for _, memory in answers(setting)]
     assert [memory[0]["episodes"] for memory in memories] == [1, 2, 2, 3, 4]
     assert memories[DOOMED] == memories[DOOMED - 1]
     assert memories[DOOMED + 1] != memories[DOOMED]
 
 
-def test_a_learner_learns_from_its_own_episodes_only(staged: Staged, learned: list[Any]) -> None:
+def test_a_learner_learns_from_its_own_episodes_only(set_up: SetUp, learned: list[Any]) -> None:
     """Beside another agent it knows as much after each of its episodes as it does alone."""
-    plan, site = staged(agents=["random", "q-learning"], **SCHOOL)
-    with Worker(plan, site) as worker:
-        memories = [memory for _, memory in run_batch(plan, worker)]
+    setting = set_up(agents=["random", "q-learning"], **SCHOOL)
+    memories = [memory for _, memory in answers(setting, jobs=2)]
     assert memories[1::2] == learned
     assert memories[0::2] == [None, None, None]

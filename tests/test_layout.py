@@ -23,8 +23,11 @@ ORDER = """
     contacts
     assertions.base assertions.collision assertions.reaction_zone assertions
     egos.base egos.constant egos.sumo egos.time_gap egos.controller egos
-    options scenario outcomes rewards world simulator jobs theatre batch
-    statistics summary progress replays listings commands cli __main__
+    options scenario outcomes rewards world simulator
+    jobs setting theatre worker_process worker batch executors
+    statistics tally stopping results recorder learning progress session
+    summary interrupts replays listings
+    commands commands.run commands.replay commands.merge cli __main__
 """.split()
 
 HEAVY = {"numpy", "pandas", "scipy", "shapely", "libsumo", "sumolib", "pydantic", "rich"}
@@ -100,4 +103,4 @@ def test_the_command_line_starts_light() -> None:
 
 def test_the_process_that_waits_has_no_sumo() -> None:
     """SUMO may take its process down, so the parent, which keeps the results, never loads it."""
-    assert "libsumo" not in loaded_by("cavsumo.batch, cavsumo.commands")
+    assert "libsumo" not in loaded_by("cavsumo.session, cavsumo.commands.run")

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import json
 import math
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -13,18 +15,9 @@ from hypothesis import strategies as st
 
 from cavsumo.bodies import CAR, PEDESTRIAN, Body
 from cavsumo.errors import ResultsError
-from cavsumo.outcomes import (
-    COLUMNS,
-    FORMAT,
-    Outcome,
-    ResultsWriter,
-    cell,
-    frame,
-    read_manifest,
-    read_results,
-    read_rows,
-    read_trace,
-)
+from cavsumo.outcomes import COLUMNS, Outcome, Row, cell, frame, trace_text
+from cavsumo.recorder import Recorder
+from cavsumo.results import FORMAT, read_manifest, read_results, read_rows, read_trace
 from cavsumo.snapshot import BodyState, Snapshot
 
 finite = st.floats(allow_nan=False, allow_infinity=False)
@@ -42,6 +35,21 @@ def seen(step: int, x: float = 1.0) -> dict[str, Any]:
     tester = BodyState(Body("tester0", PEDESTRIAN), 5.0, 6.0, 1.0, -0.5)
     other = (Body("car0", CAR), 9.0, 9.0, 9.0, 3.0)
     return frame(Snapshot(step, 0.1 * step, ego, 0.25, (tester,), (other,)))
+
+
+def played(run: int, *frames: dict[str, Any], **more: Any) -> Outcome:
+    """The outcome of an episode, with a trace if there are frames."""
+    mine = row(run, **more)
+    return Outcome(mine, trace_text(mine, frames) if frames else "")
+
+
+@contextmanager
+def recording(file: Path, manifest: Row | None = None) -> Iterator[Recorder]:
+    """A batch that is begun, and finished on leaving."""
+    with Recorder(file) as recorder:
+        recorder.begin(manifest or {}, overwrite=True)
+        yield recorder
+        recorder.finish("finished", {})
 
 
 def manifest_of(file: Path) -> dict[str, Any]:
@@ -92,38 +100,39 @@ def test_a_cell_is_its_number_to_half_a_thousandth(value: float) -> None:
 
 def test_the_header_names_every_column(tmp_path: Path) -> None:
     """The first line is there before any episode, with the columns in their order."""
-    ResultsWriter(tmp_path / "r.csv", {}).finish("finished", {})
+    with recording(tmp_path / "r.csv"):
+        pass
     assert (tmp_path / "r.csv").read_text(encoding="utf-8") == ",".join(COLUMNS) + "\n"
 
 
 def test_rows_can_be_read_while_the_batch_runs(tmp_path: Path) -> None:
     """Each row is on the disk as soon as it is written, so that a killed batch keeps it."""
     file = tmp_path / "r.csv"
-    writer = ResultsWriter(file, {})
-    for run in range(3):
-        writer.write(Outcome(row(run, time_s=1.25), []))
-        assert [r["run"] for r in read_rows(file)] == [str(i) for i in range(run + 1)]
-    assert read_rows(file)[2]["time_s"] == "1.250"
-    writer.finish("finished", {})
+    with recording(file) as recorder:
+        for run in range(3):
+            recorder.write(played(run, time_s=1.25))
+            assert [r["run"] for r in read_rows(file)] == [str(i) for i in range(run + 1)]
+        assert read_rows(file)[2]["time_s"] == "1.250"
 
 
-def test_text_with_commas_quotes_and_lines_comes_back(tmp_path: Path) -> None:
-    """An error message is one cell, whatever is in it."""
+def test_text_with_commas_and_quotes_comes_back(tmp_path: Path) -> None:
+    """An error message is one cell whatever is in it; its lines become one, as a row is a line."""
     message = 'SUMO: "edge, 1"\nis unknown: Mäkelänkatu'
-    writer = ResultsWriter(tmp_path / "r.csv", {})
-    writer.write(Outcome(row(0, outcome="error", error=message), []))
-    writer.finish("finished", {})
-    assert read_rows(tmp_path / "r.csv")[0]["error"] == message
+    with recording(tmp_path / "r.csv") as recorder:
+        recorder.write(played(0, outcome="error", error=message))
+    assert read_rows(tmp_path / "r.csv")[0]["error"] == message.replace("\n", " ")
+    assert (tmp_path / "r.csv").read_bytes().count(b"\n") == 2
 
 
 def test_the_manifest_says_running_until_it_says_finished(tmp_path: Path) -> None:
     """A manifest that still says running belongs to a batch that was killed."""
     file = tmp_path / "r.csv"
-    writer = ResultsWriter(file, {"plan": {"seed": 1}})
-    writer.write(Outcome(row(0), []))
-    assert manifest_of(file)["status"] == "running"
-    assert manifest_of(file)["plan"] == {"seed": 1}
-    writer.finish("finished", {"episodes": 1})
+    with Recorder(file) as recorder:
+        recorder.begin({"plan": {"seed": 1}})
+        recorder.write(played(0))
+        assert manifest_of(file)["status"] == "running"
+        assert manifest_of(file)["plan"] == {"seed": 1}
+        recorder.finish("finished", {"episodes": 1})
     done = read_manifest(file)
     assert (done["status"], done["episodes"], done["format"]) == ("finished", 1, FORMAT)
     assert done["plan"] == {"seed": 1}
@@ -132,10 +141,9 @@ def test_the_manifest_says_running_until_it_says_finished(tmp_path: Path) -> Non
 
 def test_pandas_reads_numbers_as_numbers(tmp_path: Path) -> None:
     """The table has numbers where they are, and nothing where a cell is empty."""
-    writer = ResultsWriter(tmp_path / "r.csv", {})
-    writer.write(Outcome(row(0, min_gap_m=1.5), []))
-    writer.write(Outcome(row(1, min_gap_m=math.inf), []))
-    writer.finish("finished", {})
+    with recording(tmp_path / "r.csv") as recorder:
+        recorder.write(played(0, min_gap_m=1.5))
+        recorder.write(played(1, min_gap_m=math.inf))
     table = read_results(tmp_path / "r.csv")
     assert list(table.columns) == list(COLUMNS)
     assert table["min_gap_m"].tolist()[0] == 1.5
@@ -165,20 +173,20 @@ def test_missing_files_are_named(tmp_path: Path) -> None:
 def test_a_trace_lies_where_its_row_says(tmp_path: Path) -> None:
     """The path in the row is relative to the file, so that both can be moved together."""
     file = tmp_path / "r.csv"
-    writer = ResultsWriter(file, {})
-    returned = writer.write(Outcome(row(4), [seen(0), seen(1)]))
-    writer.write(Outcome(row(5), []))
-    writer.finish("finished", {})
+    with recording(file) as recorder:
+        returned = recorder.write(played(4, seen(0), seen(1)))
+        recorder.write(played(5))
     with_trace, without = read_rows(file)
     assert with_trace["trace"] == returned["trace"] == "r/run000004.jsonl"
     assert read_trace(tmp_path / with_trace["trace"]) == [seen(0), seen(1)]
     assert without["trace"] == ""
-    assert writer.traces == 1
+    assert recorder.traces == 1
 
 
 def test_a_trace_begins_with_whose_it_is(tmp_path: Path) -> None:
     """The first line names the episode, so that a trace alone can be traced back."""
-    ResultsWriter(tmp_path / "r.csv", {}).write(Outcome(row(4), [seen(0)]))
+    with recording(tmp_path / "r.csv") as recorder:
+        recorder.write(played(4, seen(0)))
     head = json.loads((tmp_path / "r" / "run000004.jsonl").read_text().splitlines()[0])
     assert head == {k: row(4)[k] for k in ("run", "agent", "ego", "seed", "outcome", "tester")}
 
@@ -187,9 +195,8 @@ def test_a_trace_begins_with_whose_it_is(tmp_path: Path) -> None:
 @given(finite)
 def test_traces_keep_full_precision(tmp_path: Path, x: float) -> None:
     """What is read is bit for bit what was written: a replay is compared with it."""
-    writer = ResultsWriter(tmp_path / "r.csv", {})
-    writer.write(Outcome(row(0), [seen(0, x)]))
-    writer.finish("finished", {})
+    with recording(tmp_path / "r.csv") as recorder:
+        recorder.write(played(0, seen(0, x)))
     (again,) = read_trace(tmp_path / "r" / "run000000.jsonl")
     assert again["ego"][0] == x
     assert math.copysign(1.0, again["ego"][0]) == math.copysign(1.0, x)
@@ -210,10 +217,9 @@ def test_a_frame_holds_every_body() -> None:
 def test_the_traces_of_an_earlier_batch_go(tmp_path: Path) -> None:
     """A shorter batch of the same name leaves no trace of the longer one before it."""
     for runs in (3, 1):
-        writer = ResultsWriter(tmp_path / "r.csv", {})
-        for run in range(runs):
-            writer.write(Outcome(row(run), [seen(0)]))
-        writer.finish("finished", {})
+        with recording(tmp_path / "r.csv") as recorder:
+            for run in range(runs):
+                recorder.write(played(run, seen(0)))
     assert [f.name for f in (tmp_path / "r").iterdir()] == ["run000000.jsonl"]
 
 
@@ -226,25 +232,23 @@ def test_the_files_of_others_stay(tmp_path: Path, name: str) -> None:
     for folder in (tmp_path / "r", tmp_path):
         folder.mkdir(exist_ok=True)
         (folder / name).write_text("mine", encoding="utf-8")
-    ResultsWriter(tmp_path / "r.csv", {}).finish("finished", {})
+    with recording(tmp_path / "r.csv"):
+        pass
     assert (tmp_path / "r" / name).read_text(encoding="utf-8") == "mine"
     assert (tmp_path / name).read_text(encoding="utf-8") == "mine"
 
 
 def test_a_folder_that_cannot_be_written_is_one_sentence(tmp_path: Path) -> None:
     """Results cannot go where there is no folder, and the message names the file."""
-    with pytest.raises(ResultsError, match=r"r\.csv.*cannot be written"):
-        ResultsWriter(tmp_path / "nowhere" / "r.csv", {})
+    with (
+        pytest.raises(ResultsError, match=r"r\.csv.*cannot be written"),
+        recording(tmp_path / "nowhere" / "r.csv"),
+    ):
+        pytest.fail("it began")
 
 
 @pytest.mark.parametrize("name", ["r.json", "r"])
 def test_a_name_that_manifest_or_traces_need_is_not_lost(tmp_path: Path, name: str) -> None:
-    """Rows, manifest and traces never overwrite each other, whatever the file is called."""
-    try:
-        writer = ResultsWriter(tmp_path / name, {})
-    except ResultsError:
-        return  # refusing such a name is as good as coping with it
-    writer.write(Outcome(row(0), [seen(0)]))
-    writer.finish("finished", {})
-    assert read_rows(tmp_path / name)[0]["run"] == "0"
-    assert read_manifest(tmp_path / name)["status"] == "finished"
+    """Rows, manifest and traces never overwrite each other: names that could are refused."""
+    with pytest.raises(ResultsError, match=r"ends in \.csv"):
+        Recorder(tmp_path / name)

@@ -11,10 +11,13 @@ from typing import Any
 
 import pytest
 
-from cavsumo.commands import prepare, replay, replayed, run
+from cavsumo.commands.replay import replay, replayed
+from cavsumo.commands.run import Manner, run
 from cavsumo.errors import Exit, ResultsError
+from cavsumo.executors import Means
 from cavsumo.outcomes import COLUMNS, Outcome
 from cavsumo.replays import first_difference, recorded_frames, recorded_plan, recorded_row
+from cavsumo.setting import prepare
 
 Frames = list[dict[str, Any]]
 RUN = 1  # the episode that is played again
@@ -43,12 +46,12 @@ def recording(networks: dict[str, Path], tmp_path_factory: pytest.TempPathFactor
     """Two episodes with traffic at the Helsinki crossing, the second one replayed."""
     file = tmp_path_factory.mktemp("batch") / "results.csv"
     settings = {"net": networks["crossing"], "agents": ["timing"], "runs": 2, "trace": "all"}
-    run(settings, file, quiet=True, exit_zero=True)
+    run(settings, file, Means(), Manner(quiet=True, exit_zero=True))
     plan, _ = recorded_plan(file)
     row = recorded_row(file, RUN)
     frames = recorded_frames(file, row)
     assert frames is not None
-    return Recording(file, row, frames, replayed(plan, prepare(plan), RUN))
+    return Recording(file, row, frames, replayed(prepare(plan), RUN))
 
 
 def test_a_recorded_episode_comes_out_the_same(recording: Recording) -> None:
@@ -184,7 +187,7 @@ def test_a_learners_episode_can_be_replayed(networks: dict[str, Path], tmp_path:
     """The third episode of a learner, replayed after what it learned in the first two."""
     file = tmp_path / "learning.csv"
     settings = {"net": networks["pedestrians"], "agents": ["noop", "q-learning"], "runs": 3}
-    run(settings | {"trace": "all", "end": 5.0}, file, quiet=True, exit_zero=True)
+    run(settings | {"trace": "all", "end": 5.0}, file, Means(), Manner(quiet=True, exit_zero=True))
     assert replay(file, 5) == Exit.OK
 
 

@@ -10,14 +10,15 @@ from typing import Any
 import libsumo
 import pytest
 
-from cavsumo.batch import Worker, run_batch
 from cavsumo.bodies import BICYCLE, BUS, CAR, PEDESTRIAN, Body, Kind
 from cavsumo.egos import Acceleration, Drive
 from cavsumo.errors import SimulationError
+from cavsumo.jobs import job
 from cavsumo.kinematics import step_floats
 from cavsumo.roads import Start
 from cavsumo.snapshot import BodyState, Snapshot
 from cavsumo.starts import StartingArea
+from cavsumo.worker import Worker
 from cavsumo.world import World, to_sumo
 
 Opener = Callable[..., World]
@@ -100,11 +101,11 @@ def test_shown_in_its_true_width_the_same_pedestrian_stops_the_ego(open_world: O
     assert last.ego.v == 0.0
 
 
-def test_persons_on_a_real_junction_do_not_crash_sumo(staged: Callable[..., Any]) -> None:
+def test_persons_on_a_real_junction_do_not_crash_sumo(set_up: Callable[..., Any]) -> None:
     """Episodes with testers shown as persons among marked crossings run to their end."""
-    plan, site = staged("crossing", embodiment="person", agents=["programmed-random"], runs=6)
-    with Worker(plan, site) as worker:
-        rows = [outcome.row for outcome, _ in run_batch(plan, worker)]
+    setting = set_up("crossing", embodiment="person", agents=["programmed-random"], runs=6)
+    with Worker(setting) as worker:
+        rows = [worker.play(job(setting.plan, run))[0].row for run in setting.plan.todo()]
     assert [row.get("error") for row in rows] == [None] * 6
     assert sum(row["steps"] for row in rows) > 300
 

@@ -20,6 +20,7 @@ class Agent:
     """
 
     PARAMETERS: ClassVar[Mapping[str, str]] = {}
+    learns: bool = False  # whether episodes change what it knows: then they are played in sequence
 
     scene: Scene
     owned: tuple[int, ...]

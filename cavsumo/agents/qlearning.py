@@ -57,7 +57,7 @@ class QLearningAgent(Agent):
         self.epsilon = number("epsilon", epsilon, 0.0, 1.0)
         self.half_life = number("half_life", half_life, 1e-9)
         self.hold_s = number("hold_s", hold_s, 0.0)
-        self.learn = truth("learn", learn)
+        self.learn = self.learns = truth("learn", learn)
         self.weights = [0.0] * len(FEATURES) if weights is None else load_weights(Path(weights))
         self.episodes = 0
 

@@ -1,0 +1,110 @@
+"""``cavsumo merge``: the results of shards as the one file that a single run would have written."""
+
+from __future__ import annotations
+
+import heapq
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from typing import Any
+
+from cavsumo.errors import Exit, ResultsError
+from cavsumo.outcomes import Outcome
+from cavsumo.recorder import Recorder
+from cavsumo.replays import recorded_plan
+from cavsumo.results import whole_lines
+from cavsumo.setting import differences
+from cavsumo.summary import summarise
+from cavsumo.tally import Tally
+
+SHOWN = 5  # missing episodes that are named
+APART = frozenset({"shard", "deadline_s", "budget_s"})  # settings in which parts may differ
+Numbered = tuple[int, int, dict[str, str]]  # run, which part, row
+
+
+def merge(parts: Sequence[Path], output: Path, overwrite: bool, quiet: bool) -> int:
+    """Check that the parts make a whole, then write it."""
+    if output.resolve() in [part.resolve() for part in parts]:
+        raise ResultsError(f"output {str(output)!r}: is one of the parts")
+    whole = _whole_manifest(parts)
+    _check_whole(parts, whole)
+    tally = Tally()
+    with Recorder(output) as recorder:
+        recorder.begin(whole, overwrite=overwrite)
+        for run, part, row in _in_order(parts):
+            trace = _trace_of(parts[part], row)
+            tally.add(recorder.write(Outcome(row | {"run": run}, trace)))
+        facts = {"episodes": tally.rows, "counts": tally.all.outcomes}
+        recorder.finish("finished", facts)
+    if not quiet:
+        summarise(tally, output, recorder.traces)
+    return Exit.OK
+
+
+def _whole_manifest(parts: Sequence[Path]) -> dict[str, Any]:
+    """The manifest of the whole; the parts must be of one batch."""
+    first: dict[str, Any] | None = None
+    for part in parts:
+        _, manifest = recorded_plan(part)
+        if first is None:
+            first = manifest
+        different = list(differences(first, manifest, apart=APART))
+        if different:
+            raise ResultsError(
+                f"{str(part)!r} and {str(parts[0])!r} are of different batches: "
+                + "; ".join(different)
+            )
+    assert first is not None
+    kept = {"command", "ego_route", "junction", "sha256", "versions", "sumo_options"}
+    plan = dict(first["plan"]) | {"shard": None}
+    return {key: first[key] for key in first if key in kept} | {
+        "plan": plan,
+        "merged_from": [str(part) for part in parts],
+    }
+
+
+def _check_whole(parts: Sequence[Path], whole: dict[str, Any]) -> None:
+    """Every episode must be there, once."""
+    total = whole["plan"]["runs"] * len(whole["plan"]["agents"])
+    missing: list[int] = []
+    expected = owner = 0
+    for run, part, row in _in_order(parts):
+        if run < expected:
+            there = " and in ".join(repr(str(parts[i])) for i in sorted({owner, part}))
+            raise ResultsError(f"run {run} is there twice, in {there}")
+        if run >= total:
+            raise ResultsError(f"{str(parts[part])!r}: run {run} of a batch of {total} episodes")
+        missing += range(expected, min(run, expected + SHOWN))
+        _trace_of(parts[part], row)
+        expected, owner = run + 1, part
+    missing += range(expected, min(total, expected + SHOWN))
+    if missing:
+        some = ", ".join(map(str, missing[:SHOWN]))
+        more = ", ..." if len(missing) > SHOWN else ""
+        raise ResultsError(f"the parts have gaps: no run {some}{more} of {total} episodes")
+
+
+def _in_order(parts: Sequence[Path]) -> Iterator[Numbered]:
+    """The rows of all parts by their numbers."""
+    return heapq.merge(*(_numbered(part, i) for i, part in enumerate(parts)), key=lambda n: n[:2])
+
+
+def _numbered(part: Path, index: int) -> Iterator[Numbered]:
+    """The rows of one part, which must ascend."""
+    last = -1
+    for _, row in whole_lines(part):
+        if row is not None:
+            run = int(row["run"])
+            if run <= last:
+                raise ResultsError(f"results {str(part)!r}: run {run} stands behind run {last}")
+            last = run
+            yield run, index, row
+
+
+def _trace_of(part: Path, row: dict[str, str]) -> str:
+    """The trace of a row, empty for none."""
+    if not row["trace"]:
+        return ""
+    try:
+        return (part.parent / row["trace"]).read_text(encoding="utf-8")
+    except (OSError, UnicodeDecodeError) as error:
+        raise ResultsError(f"results {str(part)!r}: trace of run {row['run']}: {error}") from error

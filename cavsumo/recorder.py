@@ -1,0 +1,240 @@
+"""Results on disk, written so that whatever happens, what stands there is whole.
+
+The results file is locked while a batch writes it. Every row is one write, its trace is there
+before it, and the manifest is replaced as a whole. A process that is killed leaves at most one
+torn row at the end, which ``resume`` takes off again; a full disk leaves none.
+"""
+
+from __future__ import annotations
+
+import errno
+import fcntl
+import json
+import os
+from collections.abc import Iterator, Mapping
+from io import FileIO
+from pathlib import Path
+from typing import Any
+
+from cavsumo.errors import BatchError, ResultsError
+from cavsumo.outcomes import COLUMNS, Outcome, Row, row_line
+from cavsumo.results import FORMAT, HEADER, check_replaceable, trace_name, whole_lines
+
+STARTING = "starting"  # a manifest that says so owns none of the rows that lie beside it
+RUNNING = "running"
+
+
+class Recorder:
+    """Writes a batch: manifest first and last, rows as they come; a context manager.
+
+    Entering locks the results file and changes nothing; then either ``begin`` or ``resume``.
+
+    Attributes:
+        traces: how many rows have a trace.
+    """
+
+    def __init__(self, csv_file: Path) -> None:
+        if csv_file.suffix != ".csv":  # the manifest and the traces take the other names
+            raise ResultsError(f"results {str(csv_file)!r}: expected a name that ends in .csv")
+        self.csv_file = csv_file
+        self.manifest_file = csv_file.with_suffix(".json")
+        self.trace_folder = csv_file.with_suffix("")
+        self.traces = 0
+        self.manifest: dict[str, Any] = {}
+        self._begun = False
+
+    def __enter__(self) -> Recorder:
+        self._created = not self.csv_file.exists()
+        self._file = _locked(self.csv_file)
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        if self._created and not self._begun:  # nothing was begun: leave nothing behind
+            self.csv_file.unlink(missing_ok=True)
+        self._file.close()
+
+    def begin(self, manifest: Mapping[str, Any], *, overwrite: bool = False) -> None:
+        """Start a batch in place of a finished one; raises ResultsError if that fails.
+
+        What is not finished, or not ours, is only overwritten when asked for.
+        """
+        if not overwrite:
+            check_replaceable(self.csv_file)
+        try:
+            self.manifest, self._begun = dict(manifest), True
+            self._write_manifest(STARTING)
+            self._file.truncate(0)
+            self._remove_traces(after=-1)
+            self._start_rows()
+        except OSError as error:
+            raise ResultsError(
+                f"results {str(self.csv_file)!r}: cannot be written: {error.strerror}"
+            ) from error
+
+    def resume(self, manifest: Mapping[str, Any], todo: Iterator[int]) -> Iterator[dict[str, str]]:
+        """Go on behind the rows that are there, yielding them; call until exhausted.
+
+        Args:
+            manifest: the recorded one, with what has changed since.
+            todo: the numbers of the batch's episodes in order; left behind the last one done.
+        """
+        if manifest.get("status") != STARTING:
+            yield from self._whole_rows(todo)
+        try:
+            self._begun = True
+            self.manifest = {k: v for k, v in manifest.items() if k not in _FRAME}
+            self._file.truncate(self._size)
+            self._remove_traces(after=self._last)
+            self._start_rows()
+        except OSError as error:
+            raise ResultsError(
+                f"results {str(self.csv_file)!r}: cannot be written: {error.strerror}"
+            ) from error
+
+    _size, _last = 0, -1  # bytes of whole rows; the last episode among them
+
+    def write(self, outcome: Outcome) -> Row:
+        """Append a row, its trace first; raises BatchError when the disk takes no more."""
+        row = self._with_trace(outcome)
+        line = row_line(row).encode("utf-8")
+        try:
+            _write_all(self._file, line)
+        except OSError as error:
+            self._file.truncate(self._size)
+            raise self._no_more(error) from error
+        self._size += len(line)
+        self._last = row["run"]
+        return row
+
+    def replace(self, outcomes: Mapping[int, Outcome]) -> None:
+        """Put other rows in the place of some, all at once or not at all."""
+        rows = {run: self._with_trace(outcome) for run, outcome in outcomes.items()}
+        new_file = self.csv_file.with_name(f".{self.csv_file.name}.new")
+        new_file.unlink(missing_ok=True)
+        new = _locked(new_file)
+        try:
+            with self.csv_file.open("rb") as old, new_file.open("wb") as stream:
+                stream.write(old.readline())
+                for line in old:
+                    row = rows.get(int(line.split(b",", 1)[0]))
+                    stream.write(line if row is None else row_line(row).encode("utf-8"))
+                stream.flush()
+                os.fsync(stream.fileno())
+            new_file.replace(self.csv_file)
+        except OSError as error:
+            new.close()
+            new_file.unlink(missing_ok=True)
+            raise self._no_more(error) from error
+        self._file.close()
+        self._file = new
+        self._size = self.csv_file.stat().st_size
+
+    def checkpoint(self, facts: Mapping[str, Any]) -> None:
+        """Note facts in the manifest of the running batch."""
+        self.manifest.update(facts)
+        try:
+            self._write_manifest(RUNNING)
+        except OSError as error:
+            raise self._no_more(error) from error
+
+    def finish(self, status: str, facts: Mapping[str, Any]) -> None:
+        """Make the rows durable and complete the manifest."""
+        self.manifest.update(facts)
+        try:
+            os.fsync(self._file.fileno())
+            self._write_manifest(status)
+        except OSError as error:
+            raise self._no_more(error) from error
+
+    def _with_trace(self, outcome: Outcome) -> Row:
+        """The row, naming its trace if there is one; the trace is written."""
+        row = dict(outcome.row)
+        name = trace_name(self.csv_file, row["run"])
+        file = self.csv_file.parent / name
+        if not outcome.trace:
+            if self.traces:  # a batch that has none has no folder to look into
+                file.unlink(missing_ok=True)
+            return row
+        try:
+            self.trace_folder.mkdir(exist_ok=True)
+            file.write_text(outcome.trace, encoding="utf-8")
+        except OSError as error:
+            file.unlink(missing_ok=True)
+            raise self._no_more(error) from error
+        self.traces += 1
+        return row | {"trace": name}
+
+    def _whole_rows(self, todo: Iterator[int]) -> Iterator[dict[str, str]]:
+        """The rows that are there, which must be those that the batch begins with."""
+        for line, row in whole_lines(self.csv_file):
+            if row is not None:
+                expected = next(todo, None)
+                if row["run"] != str(expected):
+                    due = "none" if expected is None else f"run {expected}"
+                    raise ResultsError(
+                        f"results {str(self.csv_file)!r}: run {row['run']} where {due} is due"
+                    )
+                self._last = int(row["run"])
+                self.traces += bool(row["trace"])
+                yield row
+            self._size += len(line)
+
+    def _start_rows(self) -> None:
+        """Be ready for the next row, the header before the first."""
+        if not self._size:
+            _write_all(self._file, HEADER.encode("utf-8"))
+            self._size = len(HEADER.encode("utf-8"))
+        self._write_manifest(RUNNING)
+
+    def _remove_traces(self, after: int) -> None:
+        """Remove the traces of later episodes, and nothing else."""
+        if self.trace_folder.is_dir():
+            for old in self.trace_folder.glob("run*.jsonl"):
+                number = old.stem.removeprefix("run")
+                if number.isdecimal() and int(number) > after:
+                    old.unlink()
+
+    def _write_manifest(self, status: str) -> None:
+        """Replace the manifest, all at once."""
+        data = {"format": FORMAT, "status": status, **self.manifest, "columns": dict(COLUMNS)}
+        text = json.dumps(data, indent=1, ensure_ascii=False, allow_nan=False)
+        new = self.manifest_file.with_name(f".{self.manifest_file.name}.new")
+        try:
+            new.write_text(text + "\n", encoding="utf-8")
+            new.replace(self.manifest_file)
+        except OSError:
+            new.unlink(missing_ok=True)
+            raise
+
+    def _no_more(self, error: OSError) -> BatchError:
+        """What to say when the disk takes no more."""
+        return BatchError(
+            f"results {str(self.csv_file)!r}: cannot be written: {error.strerror}; "
+            "the rows before are whole, --resume goes on from there"
+        )
+
+
+_FRAME = ("format", "status", "columns")  # what the recorder itself adds to a manifest
+
+
+def _locked(file: Path) -> FileIO:
+    """A file opened for writing, created if need be and locked until it is closed."""
+    try:
+        stream = file.open("ab", buffering=0)  # every row is one write at the end
+    except OSError as error:
+        raise ResultsError(f"results {str(file)!r}: cannot be written: {error.strerror}") from error
+    try:
+        fcntl.flock(stream, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except OSError as error:
+        stream.close()
+        if error.errno in (errno.EAGAIN, errno.EACCES):
+            raise ResultsError(f"results {str(file)!r}: another run is writing them") from error
+        raise ResultsError(f"results {str(file)!r}: no lock: {error.strerror}") from error
+    return stream
+
+
+def _write_all(file: FileIO, data: bytes) -> None:
+    """Write all of it; the system may take it in parts."""
+    left = memoryview(data)
+    while left:
+        left = left[file.write(left) :]

@@ -1,0 +1,135 @@
+"""A plan that was checked, with all that a process needs to play it, and what identifies it."""
+
+from __future__ import annotations
+
+import hashlib
+import importlib.metadata
+import platform
+import sys
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from cavsumo import __version__
+from cavsumo.assertions import ASSERTIONS
+from cavsumo.bodies import kind_named
+from cavsumo.egos import make_ego
+from cavsumo.errors import InputError
+from cavsumo.jobs import check_agents, learners
+from cavsumo.options import OPTIONS
+from cavsumo.scenario import BatchPlan
+from cavsumo.site import Site, derive_site
+
+ON_PAVEMENTS = ("pedestrian", "bicycle")  # kinds of body that may start there
+# Settings that say how much of a batch to play and not what its episodes are.
+EXTENT = frozenset(
+    {"runs", "deadline_s", "first", "until_tests", "until_half_width", "until_rate", "budget_s"}
+)
+
+
+@dataclass(frozen=True)
+class Setting:
+    """What a process needs to play the jobs of a batch.
+
+    Attributes:
+        plan, site: what is played, and where.
+        folder: the working folder that the plan's files are relative to.
+        checksums: of the plan's files, so that a process elsewhere notices other ones.
+        versions: of what the results depend on.
+        key: stands for all of it.
+    """
+
+    plan: BatchPlan
+    site: Site
+    folder: str
+    checksums: Mapping[str, str]
+    versions: Mapping[str, str]
+    key: str = field(init=False)
+
+    def __post_init__(self) -> None:
+        facts = (self.plan.model_dump_json(), self.folder, self.checksums, self.versions)
+        object.__setattr__(self, "key", hashlib.sha256(repr(facts).encode()).hexdigest())
+
+    def check_here(self) -> None:
+        """Raise InputError unless this process sees the same files and versions."""
+        pairs = {**self.versions, **self.checksums}, {**versions(), **checksums(self.plan)}
+        for name, (there, here) in _unequal(*pairs):
+            raise InputError(f"{name} is {here} in the process that simulates, expected {there}")
+
+
+def prepare(plan: BatchPlan) -> Setting:
+    """Check every name and parameter of a plan and derive its site; raises InputError."""
+    scenario = plan.scenario
+    check_agents(plan)
+    for name in scenario.assertions:
+        ASSERTIONS.make(name, scenario.assertion_params)
+    if kind_named(scenario.kind).name not in ON_PAVEMENTS:
+        raise InputError(
+            f"kind {scenario.kind!r}: testers start on pavements, where only "
+            f"{' and '.join(ON_PAVEMENTS)} can be"
+        )
+    if plan.shard and learners(plan):
+        raise InputError(
+            f"shard {plan.shard}: {' and '.join(sorted(learners(plan)))} learns from episode to "
+            "episode, in sequence; learn=false plays what was learned"
+        )
+    ego = make_ego(scenario.ego, scenario.ego_params)
+    site = derive_site(scenario.net, scenario.ego_route, scenario.junction, ego.kind.length)
+    return Setting(plan, site, str(Path.cwd()), checksums(plan), versions())
+
+
+def checksums(plan: BatchPlan) -> dict[str, str]:
+    """The SHA-256 of every file that a plan names."""
+    scenario = plan.scenario
+    files = [scenario.net, *([scenario.routes] if scenario.routes else []), *scenario.additional]
+    return {str(file): hashlib.sha256(file.read_bytes()).hexdigest() for file in files}
+
+
+def versions() -> dict[str, str]:
+    """The versions of what the results depend on."""
+    packages = ("libsumo", "sumolib", "numpy", "shapely")
+    return {"cavsumo": __version__, "python": platform.python_version()} | {
+        name: importlib.metadata.version(name) for name in packages
+    }
+
+
+def manifest(setting: Setting) -> dict[str, Any]:
+    """What makes a batch reproducible."""
+    return {
+        "command": ["cavsumo", *sys.argv[1:]],
+        "plan": setting.plan.model_dump(mode="json"),
+        "ego_route": list(setting.site.route.edges),
+        "junction": setting.site.route.junction,
+        "sha256": dict(setting.checksums),
+        "versions": dict(setting.versions),
+        "sumo_options": dict(OPTIONS),
+    }
+
+
+def differences(
+    first: Mapping[str, Any], second: Mapping[str, Any], *, apart: frozenset[str] = EXTENT
+) -> Iterator[str]:
+    """What makes two manifests those of different batches, in words, some settings apart."""
+    plans = [dict(m.get("plan") or {}) for m in (first, second)]
+    scenarios = [plan.pop("scenario", {}) for plan in plans]
+    for name, (was, is_) in (*_unequal(*scenarios), *_unequal(*plans)):
+        if name not in apart:
+            yield f"{name} was {was!r}, is {is_!r}"
+    yield from changes(first, second)
+
+
+def changes(recorded: Mapping[str, Any], now: Mapping[str, Any]) -> Iterator[str]:
+    """What changed around a plan that stayed the same: versions, files, SUMO's options."""
+    for part in ("versions", "sha256", "sumo_options"):
+        for name, (was, is_) in _unequal(recorded.get(part) or {}, now[part]):
+            yield f"{part}: {name} was {was}, is {is_}"
+
+
+def _unequal(
+    first: Mapping[str, Any], second: Mapping[str, Any]
+) -> Iterator[tuple[str, tuple[Any, Any]]]:
+    """The keys with different values, and the values; None where there is none."""
+    for key in {**first, **second}:
+        if first.get(key) != second.get(key):
+            yield key, (first.get(key), second.get(key))

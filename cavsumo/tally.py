@@ -1,0 +1,129 @@
+"""What a batch found so far, counted row by row: small, however many rows there are."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+from cavsumo.assertions.base import HELD, UNFAIR, VIOLATED
+from cavsumo.outcomes import cell, is_failure
+from cavsumo.statistics import Rate, rate, sequential_rate
+
+Row = Mapping[str, Any]
+RATES = ("tests", "failures")
+
+
+def is_test(row: Row) -> bool:
+    """Whether the precondition was triggered: a test in the seed's sense."""
+    return row["outcome"] in (HELD, VIOLATED)
+
+
+@dataclass
+class Found:
+    """What one agent found.
+
+    Attributes:
+        outcomes: how often each outcome came out.
+        times: when tests were triggered, by time [s] to three decimals.
+    """
+
+    outcomes: Counter[str] = field(default_factory=Counter)
+    times: Counter[float] = field(default_factory=Counter)
+
+    @property
+    def episodes(self) -> int:
+        """How many were played."""
+        return self.outcomes.total()
+
+    @property
+    def valid(self) -> int:
+        """How many count as tried."""
+        return self.episodes - self.outcomes["error"] - self.outcomes["invalid"]
+
+    @property
+    def tests(self) -> int:
+        """How many were tests."""
+        return self.outcomes[HELD] + self.outcomes[VIOLATED]
+
+    @property
+    def failures(self) -> int:
+        """How many tests the ego failed."""
+        return self.outcomes[VIOLATED]
+
+    @property
+    def unfair(self) -> int:
+        """How many left the ego no chance."""
+        return self.outcomes[UNFAIR]
+
+    @property
+    def errors(self) -> int:
+        """How many could not be played."""
+        return self.outcomes["error"]
+
+    def rate(self, name: str, *, sequential: bool = False) -> Rate:
+        """A rate: "tests" among valid episodes or "failures" among tests."""
+        count, total = (self.tests, self.valid) if name == "tests" else (self.failures, self.tests)
+        return sequential_rate(count, total) if sequential else rate(count, total)
+
+    def median_time(self) -> float | None:
+        """The median time of the triggers [s], None without any."""
+        total = self.times.total()
+        if not total:
+            return None
+        ordered = sorted(self.times.items())
+        return (_nth(ordered, (total - 1) // 2) + _nth(ordered, total // 2)) / 2
+
+
+class Tally:
+    """Counts rows by agent.
+
+    Attributes:
+        agents: what each agent found, in the order in which they first appear.
+        first: the first row of each kind: "failure", "test", "error".
+        rows: how many rows there were.
+    """
+
+    def __init__(self) -> None:
+        self.agents: dict[str, Found] = {}
+        self.first: dict[str, Row] = {}
+        self.rows = 0
+
+    def add(self, row: Row) -> None:
+        """Count one more row, as it was made or as it was read."""
+        found = self.agents.setdefault(row["agent"], Found())
+        self.rows += 1
+        found.outcomes[row["outcome"]] += 1
+        if is_test(row):
+            found.times[float(cell(row["trigger_time_s"]))] += 1
+            self.first.setdefault("test", row)
+        if is_failure(row):
+            self.first.setdefault("failure", row)
+        if row["outcome"] == "error":
+            self.first.setdefault("error", row)
+
+    @property
+    def all(self) -> Found:
+        """What all agents found together."""
+        together = Found()
+        for found in self.agents.values():
+            together.outcomes.update(found.outcomes)
+        return together
+
+
+def tallied(rows: Iterable[Row]) -> Found:
+    """What some rows found, whoever their agents are."""
+    tally = Tally()
+    for row in rows:
+        tally.add(row)
+    return tally.all
+
+
+def _nth(ordered: list[tuple[float, int]], n: int) -> float:
+    """The n-th of values given with how often they occur, in order."""
+    for value, count in ordered:
+        n -= count
+        if n < 0:
+            return value
+    raise IndexError(n)

@@ -1,0 +1,76 @@
+"""The process that simulates: it plays jobs that come through a pipe until the pipe closes.
+
+It must never outlive the process that started it. The end of the pipe tells it, between two jobs;
+Linux kills it together with its parent; and an alarm ends an episode that hangs inside SUMO, where
+neither Python nor the pipe is heard, on any system.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import ctypes
+import os
+import signal
+import sys
+from multiprocessing.connection import Connection
+
+from cavsumo.errors import CavsumoError
+from cavsumo.jobs import Job
+from cavsumo.setting import Setting
+
+IDLE_S = 60.0  # a process with nothing to do for so long goes
+GOODBYE = "goodbye"  # its last message then
+ALARM_AFTER_S = 30.0  # how long after an episode's deadline the process ends itself
+PR_SET_PDEATHSIG = 1  # Linux, prctl(2)
+
+
+def main(pipe_fd: int, log_fd: int, parent: int) -> None:
+    """Set up what the first message describes, say so, then play."""
+    _die_with(parent)
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # the parent decides what Ctrl-C means
+    signal.signal(signal.SIGALRM, signal.SIG_DFL)
+    _divert_output(log_fd)
+    pipe = Connection(pipe_fd)
+    with contextlib.suppress(EOFError, ConnectionError):  # the parent is gone or has no more jobs
+        _serve(pipe, pipe.recv())
+
+
+def _serve(pipe: Connection, setting: Setting) -> None:
+    """Rehearse once, then play; a refusal is sent instead of None."""
+    from cavsumo.theatre import Theatre
+
+    try:
+        setting.check_here()
+        theatre = Theatre(setting.plan, setting.site)
+        theatre.rehearse()
+    except (CavsumoError, OSError) as error:
+        pipe.send(str(error))
+        return
+    pipe.send(None)
+    with theatre:
+        while pipe.poll(IDLE_S):
+            job: Job = pipe.recv()
+            signal.setitimer(signal.ITIMER_REAL, setting.plan.deadline_s + ALARM_AFTER_S)
+            answer = theatre.play(job)
+            signal.setitimer(signal.ITIMER_REAL, 0.0)
+            pipe.send(answer)
+        pipe.send(GOODBYE)
+
+
+def _die_with(parent: int) -> None:
+    """Ask Linux to kill this process when its parent dies."""
+    if sys.platform == "linux":
+        ctypes.CDLL(None).prctl(PR_SET_PDEATHSIG, signal.SIGKILL)
+    if os.getppid() != parent:  # it has died already
+        os._exit(1)
+
+
+def _divert_output(log_fd: int) -> None:
+    """Send what SUMO prints to a file; what Python prints goes to the real stderr."""
+    sys.stdout = sys.stderr = os.fdopen(os.dup(2), "w", buffering=1)
+    os.dup2(log_fd, 1)
+    os.dup2(log_fd, 2)
+
+
+if __name__ == "__main__":
+    main(*(int(word) for word in sys.argv[1:]))
