@@ -26,6 +26,7 @@ from cavsumo.executors import local_executor
 from cavsumo.geometry import Box, overlap, zone_entered
 from cavsumo.jobs import job
 from cavsumo.kinematics import step_floats
+from cavsumo.outcomes import is_test
 from cavsumo.roads import Start
 from cavsumo.scenario import BatchPlan, plan_from
 from cavsumo.setting import Setting, prepare
@@ -34,7 +35,7 @@ from cavsumo.snapshot import BodyState
 from cavsumo.starts import draw_starts
 from cavsumo.statistics import rate
 from cavsumo.summary import interval, percent
-from cavsumo.tally import is_test, tallied
+from cavsumo.tally import tallied
 
 ROOT = Path(__file__).resolve().parent.parent
 SETTINGS = {

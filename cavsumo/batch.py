@@ -19,10 +19,11 @@ from concurrent.futures import (
     wait,
 )
 from dataclasses import dataclass
+from itertools import groupby
 from typing import Any
 
 from cavsumo.errors import BatchError, CavsumoError
-from cavsumo.jobs import failed, job, learners
+from cavsumo.jobs import Job, failed, job, learners
 from cavsumo.setting import Setting
 from cavsumo.worker import Answer, play
 
@@ -49,14 +50,13 @@ def run_batch(
         ahead: how many episodes to have under way or waiting for their turn to come out.
         stopped: asked all the time; once true, what runs is finished and nothing more is begun.
     """
-    line = _Line(setting, executor, dict(memories or {}))
-    runs = iter(todo)
+    line = _Line(setting, executor, todo, dict(memories or {}))
     try:
         while True:
             if stopped():
                 line.call_off()
             else:
-                line.join(runs, ahead)
+                line.join(ahead)
             if not line.entries:
                 return
             line.advance()
@@ -67,30 +67,36 @@ def run_batch(
 
 @dataclass
 class _Entry:
-    """An episode between being asked for and coming out."""
+    """Episodes that are played together, between being asked for and coming out.
 
-    run: int
+    One episode, unless episodes share a simulation: then all of those, of which only ``wanted``
+    come out.
+    """
+
+    wanted: tuple[int, ...]
     agent: str
-    future: Future[Answer] | None = None
-    answer: Answer | None = None
+    future: Future[list[Answer]] | None = None
+    answers: list[Answer] | None = None
 
 
 class _Line:
     """Episodes in the order in which they come out; each is submitted as soon as it can be."""
 
-    def __init__(self, setting: Setting, executor: Executor, memories: dict[str, Any]) -> None:
+    def __init__(
+        self, setting: Setting, executor: Executor, todo: Iterable[int], memories: dict[str, Any]
+    ) -> None:
         self.setting, self.executor, self.memories = setting, executor, memories
+        self._coming = self._grouped(todo)
         self.entries: deque[_Entry] = deque()
         self._learners = learners(setting.plan)
 
-    def join(self, runs: Iterator[int], ahead: int) -> None:
+    def join(self, ahead: int) -> None:
         """Take up episodes until so many are in line, and submit those that can start."""
-        agents = self.setting.plan.agents
-        while len(self.entries) < ahead and (run := next(runs, None)) is not None:
-            self.entries.append(_Entry(run, agents[run % len(agents)]))
+        while len(self.entries) < ahead and (entry := next(self._coming, None)) is not None:
+            self.entries.append(entry)
         learning = set()
         for entry in self.entries:
-            if entry.answer is None and entry.agent in self._learners:
+            if entry.answers is None and entry.agent in self._learners:
                 if entry.agent in learning:
                     continue  # its turn comes when it knows what the episode before teaches
                 learning.add(entry.agent)
@@ -99,24 +105,24 @@ class _Line:
 
     def advance(self) -> None:
         """Wait a moment for something to finish."""
-        waiting = [e for e in self.entries if e.future is not None and e.answer is None]
+        waiting = [e for e in self.entries if e.future is not None and e.answers is None]
         wait([e.future for e in waiting if e.future], POLL_S, return_when=FIRST_COMPLETED)
         for entry in waiting:
             if entry.future is not None and entry.future.done():
-                entry.answer = self._answer(entry, entry.future)
+                entry.answers = self._answers(entry, entry.future)
                 if entry.agent in self._learners:
-                    self.memories[entry.agent] = entry.answer[1]
+                    self.memories[entry.agent] = entry.answers[-1][1]
 
     def ready(self) -> Iterator[Answer]:
         """What can come out: all that is finished before the first that is not."""
-        while self.entries and (answer := self.entries[0].answer) is not None:
+        while self.entries and (answers := self.entries[0].answers) is not None:
             self.entries.popleft()
-            yield answer
+            yield from answers
 
     def call_off(self) -> None:
         """Drop what has not started, and what would come out behind it."""
         for place, entry in enumerate(self.entries):
-            if entry.answer is None and (entry.future is None or entry.future.cancel()):
+            if entry.answers is None and (entry.future is None or entry.future.cancel()):
                 for later in list(self.entries)[place:]:
                     if later.future is not None:
                         later.future.cancel()
@@ -124,24 +130,37 @@ class _Line:
                     self.entries.pop()
                 return
 
+    def _grouped(self, runs: Iterable[int]) -> Iterator[_Entry]:
+        """Episodes that share a simulation together."""
+        block, agents = self.setting.plan.block, self.setting.plan.agents
+        for _, group in groupby(runs, lambda run: run // block):
+            wanted = tuple(group)
+            yield _Entry(wanted, agents[wanted[0] % len(agents)])
+
+    def _jobs(self, entry: _Entry) -> list[Job]:
+        """The jobs of an entry, from the beginning of the simulation that they share."""
+        plan, last = self.setting.plan, entry.wanted[-1]
+        memory = self.memories.get(entry.agent)
+        return [job(plan, run, memory) for run in range(last - last % plan.block, last + 1)]
+
     def _submit(self, entry: _Entry) -> None:
-        """Hand an episode to the executor."""
-        work = job(self.setting.plan, entry.run, self.memories.get(entry.agent))
+        """Hand an entry to the executor."""
         try:
-            entry.future = self.executor.submit(play, self.setting, work)
+            entry.future = self.executor.submit(play, self.setting, self._jobs(entry))
         except RuntimeError as error:  # as executors say that they are shut down or broken
             raise BatchError(f"the executor takes no more episodes: {error}") from error
 
-    def _answer(self, entry: _Entry, future: Future[Answer]) -> Answer:
-        """The answer of an episode; what the executor lost is an error of that episode."""
+    def _answers(self, entry: _Entry, future: Future[list[Answer]]) -> list[Answer]:
+        """The answers of an entry; what the executor lost are errors of its episodes."""
         try:
-            return future.result()
+            answers = future.result()
         except (CancelledError, BrokenExecutor, OSError) as error:
             said = f"{type(error).__name__} {error}".strip()
             raise BatchError(f"the executor is gone: {said}") from error
         except CavsumoError:
             raise
         except Exception as error:  # such as dask's KilledWorker
-            work = job(self.setting.plan, entry.run, self.memories.get(entry.agent))
             said = f"the executor lost it: {type(error).__name__}: {error}"
-            return failed(self.setting.plan, work, said, 0.0), work.memory
+            plan = self.setting.plan
+            answers = [(failed(plan, j, said, 0.0), j.memory) for j in self._jobs(entry)]
+        return [answer for answer in answers if answer[0].row["run"] in entry.wanted]

@@ -16,7 +16,7 @@ from cavsumo.errors import BatchError, CavsumoError, Exit, InputError
 PLAIN = (
     "net routes ego junction agents runs seed end step_length testers kind bodies_per_agent "
     "embodiment sumo_width start_speed trace assertions "
-    "shard first until_tests until_half_width until_rate"
+    "reset shard first until_tests until_half_width until_rate"
 ).split()
 
 
@@ -82,6 +82,12 @@ def _add_run(commands: Any) -> None:
     batch.add_argument("--step-length", type=float, metavar="S", help="timestep [s] (default 0.1)")
     batch.add_argument(
         "--deadline", type=float, metavar="S", help="real time an episode may take (default 120)"
+    )
+    batch.add_argument(
+        "--reset",
+        choices=("fresh", "shared"),
+        help="shared: search in one simulation for many episodes, then play each test found again "
+        "in a fresh one (default fresh)",
     )
     _add_means(run.add_argument_group("processes"))
     _add_stopping(run.add_argument_group("stopping early"))

@@ -6,7 +6,7 @@ Imported by the parent process, so nothing here touches SUMO.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 
@@ -27,6 +27,7 @@ class Job:
         seed: the episode's seed.
         memory: what the agents learned in earlier episodes, one entry an agent; None for none.
         record: keep the frames whatever happens.
+        simulation: "own", or "new" to start one that later jobs share as the "same".
     """
 
     run: int
@@ -34,6 +35,7 @@ class Job:
     seed: int
     memory: tuple[Any, ...] | None = None
     record: bool = False
+    simulation: Literal["own", "new", "same"] = "own"
 
 
 def episode_seed(batch_seed: int, episode: int) -> int:
@@ -88,6 +90,7 @@ def head(plan: BatchPlan, job: Job) -> Row:
         "agent": job.agent,
         "ego": scenario.ego,
         "testers": scenario.testers,
+        "reset": "fresh" if job.simulation == "own" else "shared",
         "embodiment": scenario.embodiment,
         "sumo_width_m": scenario.sumo_width,
         "seed": job.seed,

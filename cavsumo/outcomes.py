@@ -13,7 +13,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from cavsumo.assertions.base import VIOLATED
+from cavsumo.assertions.base import HELD, VIOLATED
 from cavsumo.snapshot import BodyState, Snapshot
 
 # The columns of results.csv with their meaning, in order; interface of everything downstream.
@@ -22,6 +22,7 @@ COLUMNS: Mapping[str, str] = {
     "agent": "tester agent",
     "ego": "vehicle under test",
     "testers": "number of tester bodies",
+    "reset": "fresh: in a simulation of its own; shared: in one that other episodes used before",
     "embodiment": "how SUMO was shown the testers: vehicle or person",
     "sumo_width_m": "width that SUMO was shown of a tester pedestrian",
     "seed": "the episode's seed, derived from the batch's seed and the number of the episode",
@@ -113,6 +114,11 @@ def frame(snapshot: Snapshot) -> dict[str, Any]:
 
 def _pose(state: BodyState) -> list[float]:
     return [state.x, state.y, state.v, state.o]
+
+
+def is_test(row: Mapping[str, Any]) -> bool:
+    """Whether the precondition was triggered: a test in the seed's sense."""
+    return row["outcome"] in (HELD, VIOLATED)
 
 
 def is_failure(row: Mapping[str, Any]) -> bool:

@@ -22,6 +22,7 @@ from pydantic import (
 
 from cavsumo.errors import InputError, UnknownName
 
+SHARED_BY = 25  # episodes that share one simulation when asked to
 Finite = Annotated[float, Field(allow_inf_nan=False)]
 Params = dict[str, bool | int | float | str]
 
@@ -85,6 +86,11 @@ class BatchPlan(BaseModel):
     seed: int = Field(1, ge=0, le=2**63 - 1)
     trace: Literal["none", "tests", "all"] = "tests"
     deadline_s: Finite = Field(120.0, gt=0)
+    reset: Literal["fresh", "shared"] = Field(
+        "fresh",
+        description="begin every episode in a simulation of its own, or search in a shared one and "
+        "play what was found again in its own",
+    )
     shard: str | None = Field(None, description="part I/N of the episodes, I from 1 to N")
     first: bool = Field(False, description="stop at the first failure")
     until_tests: int | None = Field(None, ge=1, description="stop after so many tests")
@@ -116,21 +122,26 @@ class BatchPlan(BaseModel):
             part_of(value)
         return value
 
+    @property
+    def block(self) -> int:
+        """How many episodes in a row share one simulation, and are played by one process."""
+        return SHARED_BY if self.reset == "shared" else 1
+
     def todo(self) -> Iterator[int]:
         """The numbers of the episodes, those of the shard only if there is one.
 
-        Shards take turns episode by episode, each with all agents.
+        Shards take turns, with one episode of all agents or with the episodes that share one
+        simulation, so that an episode is the same in every shard.
         """
         part, parts = part_of(self.shard) if self.shard else (1, 1)
-        agents = len(self.agents)
-        for episode in range(part - 1, self.runs, parts):
-            yield from range(episode * agents, (episode + 1) * agents)
+        total, turn = self.runs * len(self.agents), max(self.block, len(self.agents))
+        for start in range((part - 1) * turn, total, parts * turn):
+            yield from range(start, min(start + turn, total))
 
     @property
     def size(self) -> int:
         """How many episodes that are."""
-        part, parts = part_of(self.shard) if self.shard else (1, 1)
-        return len(range(part - 1, self.runs, parts)) * len(self.agents)
+        return self.runs * len(self.agents) if self.shard is None else sum(1 for _ in self.todo())
 
     def agent_params(self, agent: str, known: Mapping[str, list[str]]) -> Params:
         """The parameters meant for one agent: its own (``agent.key``) and those it knows."""

@@ -15,6 +15,7 @@ from cavsumo.outcomes import Outcome
 from cavsumo.progress import Progress
 from cavsumo.recorder import Recorder
 from cavsumo.results import COMPLETE, rows_of
+from cavsumo.scenario import BatchPlan
 from cavsumo.setting import Setting
 from cavsumo.stopping import stopping_rule
 from cavsumo.tally import Tally
@@ -86,16 +87,15 @@ class Session:
 
         An agent that learns missed a lesson then: it starts anew, and its later rows change too.
         """
-        again = _to_retry(self.recorder.csv_file, self._lessons.names)
-        self._lessons.forget(again.keys() & self._lessons.names)
-        todo = sorted(run for runs in again.values() for run in runs)
+        todo, pupils = _to_retry(self.recorder.csv_file, self.setting.plan, self._lessons.names)
+        self._lessons.forget(pupils)
         replaced: dict[int, Outcome] = {}
         with Progress(len(todo), self.quiet) as progress:
             for outcome, memory in self._answers(todo):
                 self._lessons.learned(outcome.row, memory)
                 replaced[outcome.row["run"]] = outcome
                 progress.update(self.tally)
-        if len(replaced) < len(todo) and again.keys() & self._lessons.names:
+        if len(replaced) < len(todo) and pupils:
             raise BatchError("interrupted before the learning agents were done: nothing changed")
         self.recorder.replace(replaced)
         self.tally = Tally()
@@ -119,13 +119,22 @@ class Session:
         )
 
 
-def _to_retry(csv_file: Path, learners: frozenset[str]) -> dict[str, list[int]]:
-    """By agent the episodes to play again: those not played, and all of a learner that has any."""
-    errors: dict[str, list[int]] = {}
-    lessons: dict[str, list[int]] = {name: [] for name in learners}
+def _to_retry(
+    csv_file: Path, plan: BatchPlan, learners: frozenset[str]
+) -> tuple[list[int], frozenset[str]]:
+    """The episodes to play again, and which learners start anew because they have any.
+
+    Those are all episodes of such a learner, and all that shared a simulation with an error.
+    """
+    runs: dict[str, list[int]] = {name: [] for name in learners}
+    errors, pupils, last = set(), set(), -1
     for row in rows_of(csv_file):
-        if row["outcome"] == "error":
-            errors.setdefault(row["agent"], []).append(int(row["run"]))
+        last = int(row["run"])
         if row["agent"] in learners:
-            lessons[row["agent"]].append(int(row["run"]))
-    return {name: lessons.get(name, runs) for name, runs in errors.items()}
+            runs[row["agent"]].append(last)
+        if row["outcome"] == "error":
+            errors.add(last // plan.block)
+            pupils |= {row["agent"]} & learners
+    again = {run for group in errors for run in range(group * plan.block, (group + 1) * plan.block)}
+    again |= {run for name in pupils for run in runs[name]}
+    return sorted(run for run in again if run <= last), frozenset(pupils)

@@ -69,10 +69,11 @@ def prepare(plan: BatchPlan) -> Setting:
             f"kind {scenario.kind!r}: testers start on pavements, where only "
             f"{' and '.join(ON_PAVEMENTS)} can be"
         )
-    if plan.shard and learners(plan):
+    if learners(plan) and (plan.shard or plan.reset == "shared"):
+        what = f"shard {plan.shard}" if plan.shard else "reset shared"
         raise InputError(
-            f"shard {plan.shard}: {' and '.join(sorted(learners(plan)))} learns from episode to "
-            "episode, in sequence; learn=false plays what was learned"
+            f"{what}: {' and '.join(sorted(learners(plan)))} learns from episode to episode, in "
+            "sequence; learn=false plays what was learned"
         )
     ego = make_ego(scenario.ego, scenario.ego_params)
     site = derive_site(scenario.net, scenario.ego_route, scenario.junction, ego.kind.length)

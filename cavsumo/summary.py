@@ -14,17 +14,28 @@ from cavsumo.tally import Found, Row, Tally
 WIDTH = 120  # a table cut off at the edge of a narrow terminal would hide figures
 
 
-def summarise(tally: Tally, csv_file: Path, traces: int, *, sequential: bool = False) -> None:
+def summarise(
+    tally: Tally, csv_file: Path, traces: int, *, sequential: bool = False, shared: bool = False
+) -> None:
     """Print the summary of a batch on stdout.
 
-    ``sequential``: the number of episodes may depend on what they found, so the intervals must
-    hold however it was decided to stop.
+    Args:
+        sequential: the number of episodes may depend on what they found, so the intervals must
+            hold however it was decided to stop.
+        shared: episodes shared simulations, and those played in a fresh one are found tests.
     """
     console = Console(width=WIDTH)
     console.print(_table(tally, sequential), highlight=False)
     if sequential:
         _say(console, "intervals: beta-binomial confidence sequences, valid whenever one stops")
     together = tally.all
+    if shared and together.fresh:
+        lost = together.fresh - together.tests
+        _say(
+            console,
+            f"\n{together.fresh} tests found in shared simulations and played again in fresh ones: "
+            f"{lost} ({percent(lost / together.fresh)}) did not come out as tests again",
+        )
     files = f"{csv_file}, {csv_file.with_suffix('.json')}"
     if traces:
         files += f", {csv_file.with_suffix('')}/ ({traces} traces)"

@@ -8,16 +8,11 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from cavsumo.assertions.base import HELD, UNFAIR, VIOLATED
-from cavsumo.outcomes import cell, is_failure
+from cavsumo.outcomes import cell, is_failure, is_test
 from cavsumo.statistics import Rate, rate, sequential_rate
 
 Row = Mapping[str, Any]
 RATES = ("tests", "failures")
-
-
-def is_test(row: Row) -> bool:
-    """Whether the precondition was triggered: a test in the seed's sense."""
-    return row["outcome"] in (HELD, VIOLATED)
 
 
 @dataclass
@@ -26,10 +21,12 @@ class Found:
 
     Attributes:
         outcomes: how often each outcome came out.
+        fresh: how many rows are of episodes in a simulation of their own.
         times: when tests were triggered, by time [s] to three decimals.
     """
 
     outcomes: Counter[str] = field(default_factory=Counter)
+    fresh: int = 0
     times: Counter[float] = field(default_factory=Counter)
 
     @property
@@ -95,6 +92,7 @@ class Tally:
         found = self.agents.setdefault(row["agent"], Found())
         self.rows += 1
         found.outcomes[row["outcome"]] += 1
+        found.fresh += row.get("reset") == "fresh"
         if is_test(row):
             found.times[float(cell(row["trigger_time_s"]))] += 1
             self.first.setdefault("test", row)
@@ -109,6 +107,7 @@ class Tally:
         together = Found()
         for found in self.agents.values():
             together.outcomes.update(found.outcomes)
+            together.fresh += found.fresh
         return together
 
 

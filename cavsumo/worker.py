@@ -7,6 +7,7 @@ wants an episode played waits on a pipe with a deadline, and a crash or a hang c
 from __future__ import annotations
 
 import contextlib
+import dataclasses
 import os
 import signal
 import subprocess
@@ -14,12 +15,13 @@ import sys
 import tempfile
 import threading
 import time
+from collections.abc import Sequence
 from multiprocessing import Pipe
-from typing import Any
+from typing import Any, Literal
 
 from cavsumo.errors import BatchError, InputError
 from cavsumo.jobs import Job, failed
-from cavsumo.outcomes import Outcome
+from cavsumo.outcomes import Outcome, is_test
 from cavsumo.setting import Setting
 from cavsumo.worker_process import GOODBYE
 
@@ -204,9 +206,24 @@ _WORKERS: set[Worker] = set()
 _THREAD = threading.local()
 
 
-def play(setting: Setting, job: Job) -> Answer:
-    """Play a job in a process of this thread's own: what every executor is given to do."""
-    return _own_worker(setting).play(job)
+def play(setting: Setting, jobs: Sequence[Job]) -> list[Answer]:
+    """Play jobs in a process of this thread's own: what every executor is given to do.
+
+    Several jobs share one simulation. What they find there is played again, each in a simulation
+    of its own, and that is what counts.
+    """
+    worker = _own_worker(setting)
+    if setting.plan.reset == "fresh":
+        return [worker.play(job) for job in jobs]
+    answers: list[Answer] = []
+    for job in jobs:
+        goes_on = bool(answers) and answers[-1][0].row["outcome"] != "error"
+        simulation: Literal["new", "same"] = "same" if goes_on else "new"
+        answers.append(worker.play(dataclasses.replace(job, simulation=simulation)))
+    return [
+        worker.play(job) if is_test(answer[0].row) else answer
+        for job, answer in zip(jobs, answers, strict=True)
+    ]
 
 
 def rehearse(setting: Setting) -> None:

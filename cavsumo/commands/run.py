@@ -62,7 +62,13 @@ def run(settings: Mapping[str, Any], output: Path, means: Means, manner: Manner)
                 print(_first_line(setting, jobs), file=sys.stderr)
             _play(session, manner)
     if not manner.quiet:
-        summarise(session.tally, output, recorder.traces, sequential=looks_at_rows(plan))
+        summarise(
+            session.tally,
+            output,
+            recorder.traces,
+            sequential=looks_at_rows(plan),
+            shared=plan.reset == "shared",
+        )
     return _exit_status(session, interrupts(), manner.exit_zero)
 
 
