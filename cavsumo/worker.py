@@ -26,8 +26,8 @@ from cavsumo.setting import Setting
 from cavsumo.worker_process import GOODBYE
 
 STARTUP_S = 120.0  # imports and SUMO's first start, on a slow machine
-ATTEMPTS = 3  # to start a process that dies while it starts
-LIFETIME = 20_000  # episodes that one process plays; SUMO leaks a little with every restart
+ATTEMPTS = 5  # to start a process that dies while it starts
+LIFETIME = 10_000  # episodes that one process plays; SUMO leaks a little with every restart
 Answer = tuple[Outcome, Any]  # an outcome, and what the agents know afterwards
 
 
