@@ -33,6 +33,7 @@ class Kind:
         throttle_min, throttle_max: limits of the throttle, an acceleration [m/s2].
         steering_max: largest steering angle to either side [rad].
         reach: no point of the box is farther from its centre [m].
+        inner: no point of its outline is nearer to its centre [m].
     """
 
     name: str
@@ -45,9 +46,11 @@ class Kind:
     throttle_max: float
     steering_max: float
     reach: float = field(init=False)
+    inner: float = field(init=False)
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "reach", math.hypot(self.length, self.width) / 2)
+        object.__setattr__(self, "inner", min(self.length, self.width) / 2)
 
 
 PEDESTRIAN = Kind(

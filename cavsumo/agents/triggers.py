@@ -7,7 +7,6 @@ from typing import Protocol
 
 from cavsumo.agents.walking import turn_radius
 from cavsumo.bodies import Kind
-from cavsumo.geometry import stopping_distances
 from cavsumo.kinematics import wrap
 from cavsumo.roads import Crossing
 from cavsumo.scene import Scene
@@ -75,9 +74,8 @@ class Timing:
         gap = self.gap_at_entry(snapshot, state)
         if gap is None or gap <= 0.0:
             return False
-        braking, reaction = stopping_distances(
-            snapshot.ego.v, max_decel=MAX_DECEL, reaction_time=REACTION_TIME
-        )
+        v = snapshot.ego.v
+        braking, reaction = 0.5 * v * v / MAX_DECEL, REACTION_TIME * v  # stopping_distances
         return braking + MARGIN * reaction < gap <= braking + self.aim * reaction
 
     def gap_at_entry(self, snapshot: Snapshot, state: BodyState) -> float | None:
@@ -86,7 +84,7 @@ class Timing:
             return None
         ego = snapshot.ego
         front = self.scene.ego_progress(snapshot) + self.ego_half
-        if self._last is None or self._last[0] != state:
+        if self._last is None or self._last[0] is not state:
             self._last = state, self._time_to_enter(state, self.way)
         entry = self._last[1]
         if entry is None:
