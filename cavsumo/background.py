@@ -27,6 +27,7 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Callable, Sequence
+from itertools import pairwise
 from typing import Any, NamedTuple
 
 from cavsumo.bodies import Body, Kind
@@ -59,7 +60,7 @@ def roaming(lane: Any) -> Roaming:
     shapes = {name: lane.getShape(name) for name in names if not WALKING_AREA.match(name)}
     stretch, gap = 1.0, 0.0
     for name, shape in shapes.items():
-        drawn = sum(math.dist(a, b) for a, b in zip(shape, shape[1:], strict=False))
+        drawn = sum(math.dist(a, b) for a, b in pairwise(shape))
         stretch = max(stretch, drawn / lane.getLength(name))
         for link in lane.getLinks(name):
             following = shapes.get(link[4] or link[0])  # by way of the junction, if it has one
@@ -170,9 +171,14 @@ class Lookout:
             return [self._look(other) for other in self._others]
         if self._odometer < self._due:
             return []
-        now = self._odometer
-        near = [o for o in self._others if o.due <= now and self._near(o, watchers)]
-        self._due = min([o.due for o in self._others], default=math.inf)
+        now, due = self._odometer, math.inf
+        near = []
+        for other in self._others:
+            if other.due <= now and self._near(other, watchers):
+                near.append(other)
+            if other.due < due:
+                due = other.due
+        self._due = due
         return [self._look(other) for other in near]
 
     def _muster(self, ids: tuple[str, ...]) -> None:
@@ -198,16 +204,25 @@ class Lookout:
     def _near(self, other: Sighting, watchers: Sequence[BodyState]) -> bool:
         """Look where a body is: whether it may touch a watcher now, and if not, when next."""
         x, y = self._domain.getPosition(other.body.id)
-        if other.step >= 0 and other.tame:
-            moved = math.hypot(x - other.x, y - other.y)
-            if moved > (self._step - other.step) * self._stride:
-                raise SimulationError(f"{other.body.id} jumped {moved:.1f} m: unforeseen")
-        other.x, other.y, other.step = x, y, self._step
-        gap = min([math.hypot(x - w.x, y - w.y) - w.body.kind.reach for w in watchers])
+        gap = math.inf
+        for body, there_x, there_y, _, _ in watchers:
+            distance = math.hypot(x - there_x, y - there_y) - body.kind.reach
+            if distance < gap:
+                gap = distance
         gap -= other.forward
         if other.tame:
-            other.due = self._odometer + max(gap, 0.0)
+            self._check(other, x, y)
+            other.x, other.y, other.step = x, y, self._step
+            other.due = self._odometer + gap if gap > 0.0 else self._odometer
         return gap <= ROUNDING_M
+
+    def _check(self, other: Sighting, x: float, y: float) -> None:
+        """Raise SimulationError if a body is farther from where it was than the bound allows."""
+        if other.step >= 0:
+            way, steps = math.hypot(x - other.x, y - other.y), self._step - other.step
+            if way > steps * self._stride:
+                name = other.body.id
+                raise SimulationError(f"{name} jumped: {way:.1f} m in {steps} timesteps")
 
     def _look(self, other: Sighting) -> RawState:
         """A body's state as SUMO has it."""

@@ -105,8 +105,10 @@ class ContactMonitor:
         The gap lies between the centres' distance less the boxes' reaches and the same less
         their inner radii, so most timesteps are ruled out by a later, closer one.
         """
-        if self._close and self._close[-1][2] is tester and self._close[-1][1][1:] == ego[1:]:
-            return  # both stand
+        if ego.v == 0.0 and self._close:
+            _, before, met = self._close[-1]
+            if met is tester and before[1:] == ego[1:]:
+                return  # both stand
         upper = distance - ego.body.kind.inner - tester.body.kind.inner
         if upper < self._upper:
             self._upper = upper if upper > 0.0 else 0.0

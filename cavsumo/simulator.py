@@ -117,7 +117,7 @@ def _reset(
         starts,
         stage.site.roads,
     )
-    watching = (stage.ego, *agents, *stage.assertions)
+    watching: list[Ego | Agent | Assertion] = [stage.ego, *agents, *stage.assertions]
     everything = record or any(who.sees_background for who in watching)
     snapshot = stage.world.reset(seed, _states(stage, starts), starts, everything=everything)
     for agent, team, rng in zip(agents, stage.teams, rest, strict=True):

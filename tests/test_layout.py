@@ -17,6 +17,7 @@ PACKAGE = Path(cavsumo.__file__).parent
 # From the ground up: a module uses only what stands before it, lazily or not.
 ORDER = """
     cavsumo errors checks registry kinematics geometry paths bodies snapshot roads
+    sumo_poses background
     network ego_routes starts site scene
     agents.base agents.walking agents.triggers agents.random agents.features
     agents.programmed agents.election agents.qlearning agents

@@ -22,12 +22,12 @@ PAVEMENT_GAIN = 0.5  # how strongly a walker returns to its line on the pavement
 
 def turn_limit(kind: Kind, v: float, dt: float) -> float:
     """The largest turn that full steering makes in one timestep (seed, eq. 15) [rad]."""
-    return 2.0 * v * dt / kind.wheelbase * math.sin(math.atan(0.5 * math.tan(kind.steering_max)))
+    return 2.0 * v * dt / kind.wheelbase * kind.turning
 
 
 def turn_radius(kind: Kind) -> float:
     """Radius of the circle on which a body turns at full steering, b / (2 sin beta) [m]."""
-    return kind.wheelbase / (2.0 * math.sin(math.atan(0.5 * math.tan(kind.steering_max))))
+    return kind.wheelbase / (2.0 * kind.turning)
 
 
 def room_to_turn(kind: Kind, turn: float) -> float:
@@ -168,10 +168,12 @@ class ApproachKerb:
             return walk(state, state.o, 0.0, self.dt)  # or it would creep on for ever
         # This timestep's way is walked at the old speed, whatever the throttle does.
         allowed = stopping_speed(kind, left - state.v * self.dt, self.dt)
+        if self.turning:
+            return walk(state, self.way.heading, allowed, self.dt)
         too_fast = state.v > allowed - kind.throttle_min * self.dt + 1e-9
-        if not self.turning:
+        if not too_fast:
             turn = abs(wrap(self.way.heading - state.o))
-            self.turning = not too_fast and left >= room_to_turn(kind, turn) + TURN_MARGIN_M
-        if not self.turning:
-            return walk(state, state.o, allowed if too_fast else 0.0, self.dt)
-        return walk(state, self.way.heading, allowed, self.dt)
+            self.turning = left >= room_to_turn(kind, turn) + TURN_MARGIN_M
+        if self.turning:
+            return walk(state, self.way.heading, allowed, self.dt)
+        return walk(state, state.o, allowed if too_fast else 0.0, self.dt)
