@@ -158,13 +158,6 @@ def zone_entered(
     reach = 0.5 * (length + width + body[3] + body[4]) + braking + reaction + TOUCH
     if dx * dx + dy * dy > reach * reach:
         return None
-    # A path that starts at the slope a and bends by at most k per metre is off its straight line by
-    # at most a s + k s^2 / 2 after s metres; for F, a <= k ahead and k <= |tan e| / b.
-    ahead, far = 0.5 * (length + wheelbase), braking + reaction
-    bend = math.tan(abs(steering)) / wheelbase * far * (ahead + 0.5 * far)
-    beside = 0.5 * (width + body[3] + body[4]) + bend + TOUCH
-    if abs(dy * cos(heading) - dx * sin(heading)) > beside and wheelbase > 0.0 <= bend:
-        return None
     if overlap(body, ego):
         return "body"
     if braking == 0.0:

@@ -195,9 +195,8 @@ def step_floats(
 
     Arguments, units, equations and result are those of `step` (seed, eqs 8-19).
     """
-    beta = half = 0.0
-    chord = v * dt
-    if steering:  # the formula holds without it as well; most steps of most bodies go straight
+    beta, half, chord = 0.0, 0.0, v * dt
+    if steering:  # only to save time: without steering the formula gives just this
         beta = math.atan(0.5 * math.tan(steering))
         half = v * dt * math.sin(beta) / wheelbase
         chord = v * dt * (math.sin(half) / half) if half else v * dt

@@ -15,13 +15,12 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from xml.sax.saxutils import quoteattr
 
 import libsumo
 import shapely
 
 from cavsumo.background import Background, Roaming, roaming
-from cavsumo.bodies import CAR, KINDS, PEDESTRIAN, Body
+from cavsumo.bodies import PEDESTRIAN, Body
 from cavsumo.egos.base import Acceleration, Command, Drive, Ego
 from cavsumo.errors import NoSuchAction, SimulationError
 from cavsumo.kinematics import steering_for_turn, step_floats, wrap
@@ -31,6 +30,7 @@ from cavsumo.scenario import Scenario
 from cavsumo.site import Site
 from cavsumo.snapshot import BodyState, Snapshot
 from cavsumo.sumo_poses import from_sumo, to_sumo
+from cavsumo.sumo_types import type_file
 
 EGO = "ego"
 ENTRY_S = 30.0  # how long the ego may wait for room to enter the network
@@ -58,7 +58,7 @@ class World:
         self._folder = TemporaryDirectory(prefix="cavsumo-")
         self._heard = (Path(self._folder.name) / "stderr.log").open("ab")
         self._types = Path(self._folder.name) / "types.add.xml"
-        self._types.write_text(_type_file(scenario, ego), encoding="utf-8")
+        self._types.write_text(type_file(scenario, ego), encoding="utf-8")
         self._roaming: Roaming | None = None
         shapely.prepare(site.crossings)
 
@@ -300,22 +300,3 @@ def _front(state: BodyState) -> tuple[float, float, float]:
     if not math.isfinite(x + y + v + o):  # SUMO hangs on an infinite angle
         raise SimulationError(f"{body.id}: state is not finite: {x}, {y}, {v}, {o}")
     return to_sumo(x, y, o, body.kind.length)
-
-
-def _type_file(scenario: Scenario, ego: Ego) -> str:
-    """An additional file with the vehicle types of the ego and of the tester's bodies."""
-    types = [("cavsumo_ego", {"vClass": "passenger"} | ego.vtype())]
-    for kind in KINDS.values():
-        seen = scenario.sumo_width if kind is PEDESTRIAN else kind.width
-        shape = {"length": f"{kind.length}", "width": f"{seen}", "minGap": "0"}
-        shape |= {"guiShape": "passenger" if kind is CAR else kind.name}
-        types.append((f"cavsumo_{kind.name}", {"vClass": "passenger"} | shape))
-        if kind is PEDESTRIAN:
-            types.append(("cavsumo_person", {"vClass": "pedestrian"} | shape))
-    rows = [
-        f"  <vType id={quoteattr(name)} "
-        + " ".join(f"{k}={quoteattr(v)}" for k, v in attributes.items())
-        + "/>"
-        for name, attributes in types
-    ]
-    return "\n".join(["<additional>", *rows, "</additional>", ""])

@@ -24,7 +24,7 @@ ORDER = """
     contacts
     assertions.base assertions.collision assertions.reaction_zone assertions
     egos.base egos.constant egos.sumo egos.time_gap egos.controller egos
-    options scenario outcomes rewards world simulator jobs theatre batch
+    options scenario outcomes rewards sumo_types world simulator jobs theatre batch
     statistics summary progress replays listings commands cli __main__
 """.split()
 

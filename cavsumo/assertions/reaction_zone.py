@@ -11,6 +11,7 @@ A body that touches the braking zone or the ego first makes the episode unfair.
 from __future__ import annotations
 
 import dataclasses
+import math
 from collections.abc import Mapping, Sequence
 from typing import ClassVar
 
@@ -24,7 +25,7 @@ from cavsumo.assertions.base import (
 )
 from cavsumo.checks import number
 from cavsumo.contacts import STANDING_MPS, Contact
-from cavsumo.geometry import in_frame, zone_entered
+from cavsumo.geometry import TOUCH, in_frame, zone_entered
 from cavsumo.scene import Scene
 from cavsumo.snapshot import BodyState, Snapshot
 
@@ -99,6 +100,10 @@ class ReactionZoneAssertion(Assertion):
     def _zone(self, snapshot: Snapshot, tester: BodyState) -> str | None:
         """The zone that a body touches."""
         ego = snapshot.ego
+        if not snapshot.ego_steering:  # the zones are no wider than the ego
+            across = (tester.y - ego.y) * math.cos(ego.o) - (tester.x - ego.x) * math.sin(ego.o)
+            if abs(across) > ego.body.kind.width / 2 + tester.body.kind.reach + TOUCH:
+                return None
         return zone_entered(
             tester.box,
             ego.box,
