@@ -104,7 +104,7 @@ class Background:
             vehicles, persons: the ids of all in SUMO.
             watchers: the ego and the testers, in the order of always.
         """
-        way = 0.0
+        way = 0.0  # the longest that any watcher made
         for before, now in zip(self._watchers, watchers, strict=True):
             if before is not now:
                 way = max(way, math.hypot(now.x - before.x, now.y - before.y))

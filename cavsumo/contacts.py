@@ -48,6 +48,8 @@ class ContactMonitor:
         # Where the smallest gap may have been: with its lower bound, those below any upper bound.
         self._close: list[tuple[float, BodyState, BodyState]] = []
         self._upper = math.inf
+        self._testers: tuple[BodyState, ...] = ()
+        self._among: list[Pair] = []  # those among these testers that touch
 
     @property
     def min_gap(self) -> float:
@@ -61,8 +63,7 @@ class ContactMonitor:
     def observe(self, snapshot: Snapshot) -> list[Contact]:
         """The contacts that begin in this snapshot; one that lasts is reported once."""
         pairs = self._meetings_with_ego(snapshot)
-        if len(snapshot.testers) > 1 or snapshot.raw_background:
-            pairs += _meetings_of_testers(snapshot)
+        pairs += self._meetings_of_testers(snapshot)
         if not pairs and not self._touching:
             return []
         standing = snapshot.ego.v <= STANDING_MPS
@@ -99,6 +100,15 @@ class ContactMonitor:
             pairs += [(ego, other) for other in _touching(ego, snapshot.raw_background)]
         return pairs
 
+    def _meetings_of_testers(self, snapshot: Snapshot) -> list[Pair]:
+        """Testers touching the background or each other."""
+        testers, background = snapshot.testers, snapshot.raw_background
+        if testers is not self._testers:  # or they all stand where they stood
+            self._testers, self._among = testers, _meetings_among(testers)
+        if not background:
+            return self._among
+        return [(t, other) for t in testers for other in _touching(t, background)] + self._among
+
     def _note(self, distance: float, lower: float, ego: BodyState, tester: BodyState) -> None:
         """Remember two bodies that may be the closest so far; exact gaps are dear.
 
@@ -117,12 +127,9 @@ class ContactMonitor:
             self._close = [c for c in self._close if c[0] <= self._upper]
 
 
-def _meetings_of_testers(snapshot: Snapshot) -> list[Pair]:
-    """Testers touching each other or the background."""
-    testers, background = snapshot.testers, snapshot.raw_background
+def _meetings_among(testers: tuple[BodyState, ...]) -> list[Pair]:
+    """Testers touching each other."""
     pairs: list[Pair] = []
-    if background:
-        pairs = [(t, other) for t in testers for other in _touching(t, background)]
     for i, tester in enumerate(testers[1:], 1):
         x, y, reach = tester.x, tester.y, 2 * tester.body.kind.reach
         pairs += [

@@ -34,7 +34,7 @@ class Ledger:
         # cannot change; asking the map is dear, so it is asked no earlier.
         self._on_road = [False] * len(scene.bodies)
         self._known = [(math.inf, math.inf, 0.0)] * len(scene.bodies)
-        self._seen: list[BodyState | None] = [None] * len(scene.bodies)
+        self._seen: tuple[BodyState, ...] = ()
         self._waiting = [-self._dt * TIME_COST] * len(teams)  # with nobody on the road
 
     def rewards(
@@ -42,9 +42,9 @@ class Ledger:
     ) -> tuple[list[float], bool] | None:
         """Each agent's reward for a timestep and whether the game ends; None once it is over."""
         testers, on_road = successor.testers, self._on_road
-        for i, body in enumerate(testers):
-            if body is not self._seen[i]:
-                self._seen[i] = body
+        if testers is not self._seen:
+            self._seen = testers
+            for i, body in enumerate(testers):
                 x, y, leeway = self._known[i]
                 if math.hypot(body.x - x, body.y - y) >= leeway:
                     self._look_up(i, body)

@@ -142,13 +142,17 @@ def _states(stage: Stage, starts: Sequence[Start]) -> list[BodyState]:
 
 
 def _moved(
-    testers: Sequence[BodyState],
+    testers: tuple[BodyState, ...],
     teams: Sequence[Sequence[int]],
     actions: Sequence[Sequence[Action]],
     dt: float,
 ) -> tuple[BodyState, ...]:
-    """The testers' next states by the kinematics (seed, eqs 8 to 19)."""
-    moved = list(testers)
+    """The testers' next states by the kinematics (seed, eqs 8 to 19).
+
+    A body that stands keeps its very record, and if all do, so does their tuple: by that others
+    know, without a look at the numbers, that nothing has changed.
+    """
+    moved: list[BodyState] = []
     for team, joint in zip(teams, actions, strict=True):
         if len(joint) != len(team):
             raise AgentError(f"an agent with {len(team)} bodies chose {len(joint)} actions")
@@ -162,14 +166,15 @@ def _moved(
             ):
                 raise AgentError(f"{body.id}: no such action: {throttle=}, {steering=}")
             if v == 0.0 and throttle <= 0.0 and kind.v_min == 0.0:
-                continue  # it stands: the same record, by which others know that nothing changed
+                continue
+            moved = moved or list(testers)
             moved[i] = BodyState(
                 body,
                 *step_floats(
                     x, y, v, o, throttle, steering, kind.wheelbase, kind.v_min, kind.v_max, dt
                 ),
             )
-    return tuple(moved)
+    return tuple(moved) if moved else testers
 
 
 def _observe(stage: Stage, episode: Episode, snapshot: Snapshot, record: bool) -> None:
