@@ -1,12 +1,14 @@
 """Episodes per second of cavsumo against a bare libsumo loop that makes the same calls.
 
     python benchmarks/throughput.py [--net FILE] [--testers N] [--agent NAME] [--episodes N]
+                                    [--cars N]
 
 Both play the same episodes, one after the other in one process, so that the noise of the machine
 hits both alike: trust the ratio, not the seconds. The bare loop restarts SUMO, inserts the same
 bodies, moves the testers along the recorded trajectories (moveToXY, setSpeed), steps, and reads
 position, angle and speed of every other body and SUMO's events; it draws nothing, decides nothing,
-checks nothing.
+checks nothing. The ratio a timestep leaves out the restart, up to the ego's entering, on both
+sides. ``--cars`` adds cars that wander over the network's own edges.
 """
 
 from __future__ import annotations
@@ -16,19 +18,27 @@ import statistics
 import time
 from collections import defaultdict
 from collections.abc import Callable
+from dataclasses import dataclass, field
 from pathlib import Path
+from random import Random
+from tempfile import TemporaryDirectory
 from typing import Any
+from xml.etree import ElementTree
 
 import libsumo
 
+import cavsumo.simulator as simulator
 from cavsumo.commands import prepare
 from cavsumo.jobs import job
+from cavsumo.network import read_network
 from cavsumo.scenario import plan_from
-from cavsumo.simulator import play
 from cavsumo.theatre import Theatre
 from cavsumo.world import KEEP_EXACT, MATCH_M, UNSAFE, World, to_sumo
 
 ROOT = Path(__file__).resolve().parent.parent
+
+
+SPREAD_S, WANDER = 15.0, 40  # when the added cars depart, and over how many edges they drive
 
 
 def main() -> None:
@@ -38,58 +48,128 @@ def main() -> None:
     parser.add_argument("--testers", type=int, default=3)
     parser.add_argument("--agent", default="timing")
     parser.add_argument("--episodes", type=int, default=60)
+    parser.add_argument("--cars", type=int, default=0, help="cars more than in the demand")
     options = parser.parse_args()
-    plan = plan_from(
-        {"net": options.net, "testers": options.testers, "agents": (options.agent,)}, "benchmark"
-    )
-    with Theatre(plan, prepare(plan)) as theatre:
-        full, bare, steps, ratios = compare(theatre, options.episodes)
-        shares = parts(theatre, options.episodes)
+    given = {"net": options.net, "testers": options.testers, "agents": (options.agent,)}
+    with TemporaryDirectory() as folder:
+        if options.cars:
+            demand = plan_from(given, "benchmark").scenario.routes
+            given["routes"] = str(wanderers(options.net, demand, options.cars, Path(folder)))
+        plan = plan_from(given, "benchmark")
+        with Theatre(plan, prepare(plan)) as theatre:
+            spent = compare(theatre, options.episodes)
+            shares = parts(theatre, options.episodes)
     print(
         f"{plan.scenario.name}, {options.agent}, {options.testers} testers, "
-        f"{options.episodes} episodes, {steps} steps"
+        f"{options.episodes} episodes, {spent.steps} steps, "
+        f"{statistics.median(spent.present):g} background bodies (median)"
     )
-    print(f"bare libsumo  {options.episodes / bare:7.1f} episodes/s  {steps / bare:8.0f} steps/s")
-    print(f"cavsumo       {options.episodes / full:7.1f} episodes/s  {steps / full:8.0f} steps/s")
-    low, middle, high = statistics.quantiles(ratios, n=4)
-    print(
-        f"ratio         {bare / full:7.3f}   (an episode: median {middle:.3f}, "
-        f"quartiles {low:.3f} and {high:.3f})"
-    )
+    spent.show(options.episodes)
     for name, share in shares:
         print(f"  {name:28} {100 * share:5.1f} %")
 
 
-def compare(theatre: Theatre, episodes: int) -> tuple[float, float, int, list[float]]:
-    """Seconds of cavsumo and of the bare loop for the same episodes, their steps, the ratios.
+@dataclass
+class Spent:
+    """Seconds, restarts included and alone, of cavsumo (ours) and the bare loop (bare)."""
+
+    ours: float = 0.0
+    bare: float = 0.0
+    our_restarts: float = 0.0
+    bare_restarts: float = 0.0
+    steps: int = 0
+    ratios: list[float] = field(default_factory=list)
+    present: list[int] = field(default_factory=list)
+
+    def show(self, episodes: int) -> None:
+        """Print the rates and the ratios."""
+        for name, seconds in (("bare libsumo", self.bare), ("cavsumo", self.ours)):
+            rates = f"{episodes / seconds:7.1f} episodes/s  {self.steps / seconds:8.0f} steps/s"
+            print(f"{name:13} {rates}")
+        low, middle, high = statistics.quantiles(self.ratios, n=4)
+        print(
+            f"ratio         {self.bare / self.ours:7.3f}   (an episode: median {middle:.3f}, "
+            f"quartiles {low:.3f} and {high:.3f})"
+        )
+        bare, ours = self.bare - self.bare_restarts, self.ours - self.our_restarts
+        us = 1e6 / self.steps
+        print(
+            f"a timestep    {bare / ours:7.3f}   (bare {us * bare:.0f} us, cavsumo {us * ours:.0f} "
+            "us, restarts excluded)"
+        )
+
+
+def wanderers(net: str, demand: Path | None, cars: int, folder: Path) -> Path:
+    """A demand with so many cars more, which drive at random over the network's edges."""
+    random = Random(1)
+    root = ElementTree.Element("routes")
+    if demand is not None:
+        root = ElementTree.parse(demand).getroot()
+    edges = [e for e in read_network(Path(net)).net.getEdges() if e.allows("passenger")]
+    for i in range(cars):
+        route = [random.choice(edges)]
+        while len(route) < WANDER:
+            ways = [e for e in route[-1].getAllowedOutgoing("passenger") if e in edges]
+            if not ways:
+                break
+            route.append(random.choice(ways))
+        depart = f"{SPREAD_S * i / cars:.1f}"
+        lane = {"departLane": "best", "departPos": "random_free", "departSpeed": "max"}
+        car = ElementTree.SubElement(root, "vehicle", {"id": f"car{i}", "depart": depart} | lane)
+        ElementTree.SubElement(car, "route", {"edges": " ".join(e.getID() for e in route)})
+    root[:] = sorted(root, key=lambda element: float(element.get("depart", "-1")))
+    ElementTree.ElementTree(root).write(folder / "cars.rou.xml")
+    return folder / "cars.rou.xml"
+
+
+def compare(theatre: Theatre, episodes: int) -> Spent:
+    """What cavsumo and the bare loop need for the same episodes.
 
     Each episode is played three times by each, in turns; the fastest counts, so that what else the
     machine does weighs less.
     """
-    full = bare = 0.0
-    steps, ratios = 0, []
+    spent = Spent()
+    world = theatre.stage.world
     for run in range(episodes):
         one = job(theatre.plan, run)
         agents = theatre._cast(one)
-        recorded = play(theatre.stage, agents, one.seed, record=True).frames
+        recorded = simulator.play(theatre.stage, agents, one.seed, record=True).frames
         tracks = [[to_bare(t) for t in s.testers] for s in recorded]
+        spent.present += [len(s.raw_background) for s in recorded]
         del recorded
         ours, theirs = [], []
         for _ in range(3):
-            ours.append(seconds(lambda a=agents, s=one.seed: play(theatre.stage, a, s)))
-            theirs.append(
-                seconds(lambda t=tracks, s=one.seed: bare_loop(theatre.stage.world, s, t))
-            )
-        full, bare, steps = full + min(ours), bare + min(theirs), steps + len(tracks) - 1
-        ratios.append(min(theirs) / min(ours))
-    return full, bare, steps, ratios
+            ours.append(our_seconds(theatre, agents, one.seed))
+            begun = time.perf_counter()
+            restarted = bare_loop(world, one.seed, tracks)
+            theirs.append((time.perf_counter() - begun, restarted - begun))
+        spent.steps += len(tracks) - 1
+        spent.ours, spent.our_restarts = (
+            spent.ours + min(ours)[0],
+            spent.our_restarts + min(ours)[1],
+        )
+        spent.bare += min(theirs)[0]
+        spent.bare_restarts += min(theirs)[1]
+        spent.ratios.append(min(theirs)[0] / min(ours)[0])
+    return spent
 
 
-def seconds(action: Callable[[], Any]) -> float:
-    """How long an action takes."""
+def our_seconds(theatre: Theatre, agents: list[Any], seed: int) -> tuple[float, float]:
+    """How long cavsumo plays an episode, and how long of that it restarts."""
+    restart, ended = simulator._reset, 0.0
+
+    def clocked(*args: Any) -> Any:
+        nonlocal ended
+        result = restart(*args)
+        ended = time.perf_counter()
+        return result
+
+    simulator._reset = clocked
     begun = time.perf_counter()
-    action()
-    return time.perf_counter() - begun
+    simulator.play(theatre.stage, agents, seed)
+    whole = time.perf_counter() - begun
+    simulator._reset = restart
+    return whole, ended - begun
 
 
 def to_bare(state: Any) -> tuple[str, float, float, float, float]:
@@ -97,8 +177,9 @@ def to_bare(state: Any) -> tuple[str, float, float, float, float]:
     return (state.id, *to_sumo(state.x, state.y, state.o, state.body.kind.length), state.v)
 
 
-def bare_loop(world: World, seed: int, tracks: list[list[Any]]) -> None:
-    """The same calls on libsumo, and nothing else."""
+def bare_loop(world: World, seed: int, tracks: list[list[Any]]) -> float:
+    """The same calls on libsumo, and nothing else; the time at which the ego had entered."""
+    restarted = 0.0
     vehicle, person, simulation = libsumo.vehicle, libsumo.person, libsumo.simulation
     move, set_speed = vehicle.moveToXY, vehicle.setSpeed
     libsumo.close()
@@ -123,6 +204,9 @@ def bare_loop(world: World, seed: int, tracks: list[list[Any]]) -> None:
         simulation.getCollisions()
         simulation.getStartingTeleportIDList()
         simulation.getEmergencyStoppingVehiclesIDList()
+        if step == 0:
+            restarted = time.perf_counter()
+    return restarted
 
 
 def insert(world: World, track: list[Any]) -> None:
@@ -157,8 +241,6 @@ def parts(theatre: Theatre, episodes: int) -> list[tuple[str, float]]:
 
         return timed
 
-    import cavsumo.simulator as simulator
-
     world, stage = theatre.stage.world, theatre.stage
     originals = (simulator._observe, simulator._moved)
     world.reset = clocked("restart SUMO", world.reset)  # type: ignore[method-assign]
@@ -173,7 +255,7 @@ def parts(theatre: Theatre, episodes: int) -> list[tuple[str, float]]:
         agents = theatre._cast(one)
         for agent in agents:
             agent.choose_action = clocked("agents", type(agent).choose_action.__get__(agent))  # type: ignore[method-assign]
-        play(stage, agents, one.seed)
+        simulator.play(stage, agents, one.seed)
     total = time.perf_counter() - begun
     simulator._observe, simulator._moved = originals
     spent["step SUMO"] -= spent["read SUMO"] + spent["tell SUMO (moveToXY)"]

@@ -33,6 +33,8 @@ class Kind:
         throttle_min, throttle_max: limits of the throttle, an acceleration [m/s2].
         steering_max: largest steering angle to either side [rad].
         reach: no point of the box is farther from its centre [m].
+        inner: no point of its outline is nearer to its centre [m].
+        turning: sin(beta) at full steering, which limits its turns (see ``kinematics``).
     """
 
     name: str
@@ -45,9 +47,14 @@ class Kind:
     throttle_max: float
     steering_max: float
     reach: float = field(init=False)
+    inner: float = field(init=False)
+    turning: float = field(init=False)
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "reach", math.hypot(self.length, self.width) / 2)
+        object.__setattr__(self, "inner", min(self.length, self.width) / 2)
+        turning = math.sin(math.atan(0.5 * math.tan(self.steering_max)))
+        object.__setattr__(self, "turning", turning)
 
 
 PEDESTRIAN = Kind(

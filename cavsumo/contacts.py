@@ -48,6 +48,8 @@ class ContactMonitor:
         # Where the smallest gap may have been: with its lower bound, those below any upper bound.
         self._close: list[tuple[float, BodyState, BodyState]] = []
         self._upper = math.inf
+        self._testers: tuple[BodyState, ...] = ()
+        self._among: list[Pair] = []  # those among these testers that touch
 
     @property
     def min_gap(self) -> float:
@@ -60,7 +62,8 @@ class ContactMonitor:
 
     def observe(self, snapshot: Snapshot) -> list[Contact]:
         """The contacts that begin in this snapshot; one that lasts is reported once."""
-        pairs = self._meetings_with_ego(snapshot) + _meetings_of_testers(snapshot)
+        pairs = self._meetings_with_ego(snapshot)
+        pairs += self._meetings_of_testers(snapshot)
         if not pairs and not self._touching:
             return []
         standing = snapshot.ego.v <= STANDING_MPS
@@ -83,34 +86,50 @@ class ContactMonitor:
         """The bodies that touch the ego; keeps the smallest gap to a tester."""
         ego = snapshot.ego
         body, x, y, _, _ = ego
+        own = body.kind.reach
         pairs: list[Pair] = []
         for tester in snapshot.testers:
-            distance = math.hypot(tester.x - x, tester.y - y)
-            reach = body.kind.reach + tester.body.kind.reach
+            other, there_x, there_y, _, _ = tester
+            distance = math.hypot(there_x - x, there_y - y)
+            reach = own + other.kind.reach
             if distance - reach < self._upper:
-                self._note(distance, ego, tester)
+                self._note(distance, distance - reach, ego, tester)
                 if distance <= reach and overlap(ego.box, tester.box):
                     pairs.append((ego, tester))
-        return pairs + [(ego, other) for other in _touching(ego, snapshot.raw_background)]
+        if snapshot.raw_background:
+            pairs += [(ego, other) for other in _touching(ego, snapshot.raw_background)]
+        return pairs
 
-    def _note(self, distance: float, ego: BodyState, tester: BodyState) -> None:
+    def _meetings_of_testers(self, snapshot: Snapshot) -> list[Pair]:
+        """Testers touching the background or each other."""
+        testers, background = snapshot.testers, snapshot.raw_background
+        if testers is not self._testers:  # or they all stand where they stood
+            self._testers, self._among = testers, _meetings_among(testers)
+        if not background:
+            return self._among
+        return [(t, other) for t in testers for other in _touching(t, background)] + self._among
+
+    def _note(self, distance: float, lower: float, ego: BodyState, tester: BodyState) -> None:
         """Remember two bodies that may be the closest so far; exact gaps are dear.
 
         The gap lies between the centres' distance less the boxes' reaches and the same less
         their inner radii, so most timesteps are ruled out by a later, closer one.
         """
-        a, b = ego.body.kind, tester.body.kind
-        inner = (min(a.length, a.width) + min(b.length, b.width)) / 2
-        self._upper = min(self._upper, max(0.0, distance - inner))
-        self._close.append((distance - a.reach - b.reach, ego, tester))
+        if ego.v == 0.0 and self._close:
+            _, before, met = self._close[-1]
+            if met is tester and before[1:] == ego[1:]:
+                return  # both stand
+        upper = distance - ego.body.kind.inner - tester.body.kind.inner
+        if upper < self._upper:
+            self._upper = upper if upper > 0.0 else 0.0
+        self._close.append((lower, ego, tester))
         if len(self._close) > KEPT:
             self._close = [c for c in self._close if c[0] <= self._upper]
 
 
-def _meetings_of_testers(snapshot: Snapshot) -> list[Pair]:
-    """Testers touching each other or the background."""
-    testers = snapshot.testers
-    pairs = [(t, other) for t in testers for other in _touching(t, snapshot.raw_background)]
+def _meetings_among(testers: tuple[BodyState, ...]) -> list[Pair]:
+    """Testers touching each other."""
+    pairs: list[Pair] = []
     for i, tester in enumerate(testers[1:], 1):
         x, y, reach = tester.x, tester.y, 2 * tester.body.kind.reach
         pairs += [

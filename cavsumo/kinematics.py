@@ -195,9 +195,11 @@ def step_floats(
 
     Arguments, units, equations and result are those of `step` (seed, eqs 8-19).
     """
-    beta = math.atan(0.5 * math.tan(steering))
-    half = v * dt * math.sin(beta) / wheelbase
-    chord = v * dt * (math.sin(half) / half) if half else v * dt
+    beta, half, chord = 0.0, 0.0, v * dt
+    if steering:  # only to save time: without steering the formula gives just this
+        beta = math.atan(0.5 * math.tan(steering))
+        half = v * dt * math.sin(beta) / wheelbase
+        chord = v * dt * (math.sin(half) / half) if half else v * dt
     course = o + beta + half
     v_next = v + throttle * dt
     # Comparisons, since min() and max() are calls and cost a quarter of the step.

@@ -47,8 +47,7 @@ class Path:
         if near is not None:
             first, last = max(0, near - 1), min(last, near + 3)
         found, along, nearest = first, 0.0, math.inf
-        for i in range(first, last):
-            x0, y0, ux, uy, length = self._segments[i]
+        for i, (x0, y0, ux, uy, length) in enumerate(self._segments[first:last], first):
             dx, dy = x - x0, y - y0
             t = dx * ux + dy * uy
             t = 0.0 if t < 0.0 else length if t > length else t

@@ -34,22 +34,27 @@ class Ledger:
         # cannot change; asking the map is dear, so it is asked no earlier.
         self._on_road = [False] * len(scene.bodies)
         self._known = [(math.inf, math.inf, 0.0)] * len(scene.bodies)
+        self._seen: tuple[BodyState, ...] = ()
+        self._waiting = [-self._dt * TIME_COST] * len(teams)  # with nobody on the road
 
     def rewards(
         self, successor: Snapshot, judgements: Sequence[Judgement]
     ) -> tuple[list[float], bool] | None:
         """Each agent's reward for a timestep and whether the game ends; None once it is over."""
         testers, on_road = successor.testers, self._on_road
-        for i, body in enumerate(testers):
-            x, y, leeway = self._known[i]
-            if math.hypot(body.x - x, body.y - y) >= leeway:
-                self._look_up(i, body)
-        if any(on_road):
+        if testers is not self._seen:
+            self._seen = testers
+            for i, body in enumerate(testers):
+                x, y, leeway = self._known[i]
+                if math.hypot(body.x - x, body.y - y) >= leeway:
+                    self._look_up(i, body)
+        walking = True in on_road
+        if walking:
             self.cost += self._dt * sum(on_road)
         if self._over:
             return None
-        rewards = [-self._dt * TIME_COST] * len(self._teams)
-        if any(on_road):
+        rewards = self._waiting.copy()
+        if walking:
             for a, team in enumerate(self._teams):
                 rewards[a] -= self._dt * ROAD_COST * sum([on_road[i] for i in team])
         for judgement in judgements:

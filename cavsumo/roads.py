@@ -105,7 +105,7 @@ class Roads:
         ray = LineString(
             [(x, y), (x + REACH_M * math.cos(heading), y + REACH_M * math.sin(heading))]
         )
-        span = _first_span(here, ray.intersection(self.carriageway))
+        span = _first_span(x, y, shapely.intersection(ray, self.carriageway))
         if span is None:
             return None
         enter, leave = span
@@ -126,13 +126,13 @@ def _across(lane: LineString, here: Point) -> float:
     return math.atan2(math.sin(tangent + turn), math.cos(tangent + turn))
 
 
-def _first_span(here: Point, cut: shapely.Geometry) -> tuple[float, float] | None:
-    """Distances at which a ray enters and leaves the first carriageway it meets."""
+def _first_span(x: float, y: float, cut: shapely.Geometry) -> tuple[float, float] | None:
+    """Distances from a point at which a ray from there enters and leaves the first carriageway."""
     spans = sorted(
         (min(ds), max(ds))
         for part in getattr(cut, "geoms", [cut])
         if part.geom_type == "LineString" and not part.is_empty
-        for ds in [[here.distance(Point(p)) for p in part.coords]]
+        for ds in [[math.sqrt((px - x) * (px - x) + (py - y) * (py - y)) for px, py in part.coords]]
     )
     if not spans:
         return None

@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from cavsumo.bodies import Body
-from cavsumo.paths import Path
+from cavsumo.paths import Path, Projection
 from cavsumo.roads import Crossing, Roads, Start
 from cavsumo.snapshot import Snapshot
 
@@ -42,10 +42,16 @@ class Scene:
 
     def ego_progress(self, snapshot: Snapshot) -> float:
         """How far the ego's centre is along its path [m]; computed once for each snapshot."""
+        return self.ego_projection(snapshot).along
+
+    def ego_projection(self, snapshot: Snapshot) -> Projection:
+        """Where the ego's centre is relative to its path; computed once for each snapshot."""
         last, here = self._progress
         if last is not snapshot:
-            near = None if here is None else here.segment
+            # The last segment is a hint only as long as the ego is not out of sight in between.
+            followed = here is not None and snapshot.step - last.step == 1
+            near = here.segment if followed else None
             here = self.ego_path.project(snapshot.ego.x, snapshot.ego.y, near)
             self._progress[:] = snapshot, here
-        along: float = here.along
-        return along
+        found: Projection = here
+        return found

@@ -77,7 +77,7 @@ def play(stage: Stage, agents: Sequence[Agent], seed: int, *, record: bool = Fal
         seed: of the episode; every random number in it comes from here.
         record: keep every snapshot.
     """
-    scene, snapshot = _reset(stage, agents, seed)
+    scene, snapshot = _reset(stage, agents, seed, record)
     ledger = Ledger(scene, stage.teams)
     episode = Episode(Judgement(""))
     _observe(stage, episode, snapshot, record)
@@ -101,7 +101,9 @@ def play(stage: Stage, agents: Sequence[Agent], seed: int, *, record: bool = Fal
     return _finished(stage, episode, snapshot, ledger)
 
 
-def _reset(stage: Stage, agents: Sequence[Agent], seed: int) -> tuple[Scene, Snapshot]:
+def _reset(
+    stage: Stage, agents: Sequence[Agent], seed: int, record: bool
+) -> tuple[Scene, Snapshot]:
     """Draw the starts and begin an episode; one generator for each who draws."""
     streams = np.random.SeedSequence(seed).spawn(2 + len(agents))
     placing, electing, *rest = (np.random.default_rng(s) for s in streams)
@@ -115,7 +117,9 @@ def _reset(stage: Stage, agents: Sequence[Agent], seed: int) -> tuple[Scene, Sna
         starts,
         stage.site.roads,
     )
-    snapshot = stage.world.reset(seed, _states(stage, starts), starts)
+    watching: list[Ego | Agent | Assertion] = [stage.ego, *agents, *stage.assertions]
+    everything = record or any(who.sees_background for who in watching)
+    snapshot = stage.world.reset(seed, _states(stage, starts), starts, everything=everything)
     for agent, team, rng in zip(agents, stage.teams, rest, strict=True):
         agent.reset(scene, team, rng)
     type(agents[0]).coordinate(agents, electing)
@@ -138,31 +142,39 @@ def _states(stage: Stage, starts: Sequence[Start]) -> list[BodyState]:
 
 
 def _moved(
-    testers: Sequence[BodyState],
+    testers: tuple[BodyState, ...],
     teams: Sequence[Sequence[int]],
     actions: Sequence[Sequence[Action]],
     dt: float,
 ) -> tuple[BodyState, ...]:
-    """The testers' next states by the kinematics (seed, eqs 8 to 19)."""
-    moved = list(testers)
+    """The testers' next states by the kinematics (seed, eqs 8 to 19).
+
+    A body that stands keeps its very record, and if all do, so does their tuple: by that others
+    know, without a look at the numbers, that nothing has changed.
+    """
+    moved: list[BodyState] = []
     for team, joint in zip(teams, actions, strict=True):
         if len(joint) != len(team):
             raise AgentError(f"an agent with {len(team)} bodies chose {len(joint)} actions")
         for i, (throttle, steering) in zip(team, joint, strict=True):
-            body, x, y, v, o = testers[i]
+            state = testers[i]
+            body, x, y, v, o = state
             kind = body.kind
             if not (
                 kind.throttle_min - 1e-9 <= throttle <= kind.throttle_max + 1e-9
                 and abs(steering) <= kind.steering_max + 1e-9
             ):
                 raise AgentError(f"{body.id}: no such action: {throttle=}, {steering=}")
+            if v == 0.0 and throttle <= 0.0 and kind.v_min == 0.0:
+                continue
+            moved = moved or list(testers)
             moved[i] = BodyState(
                 body,
                 *step_floats(
                     x, y, v, o, throttle, steering, kind.wheelbase, kind.v_min, kind.v_max, dt
                 ),
             )
-    return tuple(moved)
+    return tuple(moved) if moved else testers
 
 
 def _observe(stage: Stage, episode: Episode, snapshot: Snapshot, record: bool) -> None:
@@ -190,7 +202,10 @@ def _feed_back(
 
 def _over(stage: Stage, snapshot: Snapshot) -> bool:
     """The terminator psi: every assertion decided, or the horizon with none pending."""
-    if all(a.decided for a in stage.assertions):
+    for assertion in stage.assertions:
+        if not assertion.decided:
+            break
+    else:
         return True
     left = stage.horizon - snapshot.time
     if left > 1e-9:

@@ -46,7 +46,9 @@ class Snapshot(NamedTuple):
         ego_steering: its steering angle in the last timestep [rad]; for an ego that SUMO moves,
             the angle that its turn implies (seed, eq. 22).
         testers: the tester's bodies, in the order of the scenario.
-        raw_background: everybody else, as plain tuples in the field order of BodyState.
+        raw_background: everybody else, as plain tuples in the field order of BodyState. When no
+            ego, agent or assertion of the episode ``sees_background`` and nothing is recorded,
+            those are left out who cannot touch the ego or a tester now (see ``background``).
     """
 
     step: int
@@ -58,5 +60,5 @@ class Snapshot(NamedTuple):
 
     @property
     def background(self) -> tuple[BodyState, ...]:
-        """Everybody else, as records (made anew at each call)."""
+        """Everybody in ``raw_background``, as records (made anew at each call)."""
         return tuple(BodyState(*raw) for raw in self.raw_background)

@@ -2,10 +2,7 @@
 
 SUMO learns where the bodies are and moves the background traffic (and the ego, unless a
 controller drives it). What it says about moved bodies is never read back: their truth is in
-Python. Angles and reference points are converted here and nowhere else:
-
-* cavsumo: the centre of the box [m], radians anticlockwise from east;
-* SUMO: the middle of the front edge [m], degrees clockwise from north.
+Python.
 
 Each process has one simulation: libsumo knows no second one.
 """
@@ -18,13 +15,12 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import Any
-from xml.sax.saxutils import quoteattr
 
 import libsumo
 import shapely
 
-from cavsumo.bodies import CAR, KINDS, PEDESTRIAN, Body, Kind
+from cavsumo.background import Background, Roaming, roaming
+from cavsumo.bodies import PEDESTRIAN, Body
 from cavsumo.egos.base import Acceleration, Command, Drive, Ego
 from cavsumo.errors import NoSuchAction, SimulationError
 from cavsumo.kinematics import steering_for_turn, step_floats, wrap
@@ -32,10 +28,11 @@ from cavsumo.options import OPTIONS
 from cavsumo.roads import Start
 from cavsumo.scenario import Scenario
 from cavsumo.site import Site
-from cavsumo.snapshot import BodyState, RawState, Snapshot
+from cavsumo.snapshot import BodyState, Snapshot
+from cavsumo.sumo_poses import from_sumo, to_sumo
+from cavsumo.sumo_types import type_file
 
 EGO = "ego"
-RADIANS = math.pi / 180.0
 ENTRY_S = 30.0  # how long the ego may wait for room to enter the network
 KEEP_EXACT = 2  # moveToXY: exactly there, on the network or off it
 KEEP_EXACT_ANY_LANE = 6  # the same for persons, on lanes for cars too
@@ -43,20 +40,6 @@ KEEP_EXACT_ANY_LANE = 6  # the same for persons, on lanes for cars too
 # much per call for a body off the road, and no lane is wider than twice this.
 MATCH_M = 5.0
 UNSAFE = 0  # setSpeedMode: no check of SUMO's own interferes with what was commanded
-
-
-def to_sumo(x: float, y: float, o: float, length: float) -> tuple[float, float, float]:
-    """Centre and radians to the middle of the front edge and SUMO's degrees."""
-    half = length / 2
-    return x + half * math.cos(o), y + half * math.sin(o), (90.0 - math.degrees(o)) % 360.0
-
-
-def from_sumo(x: float, y: float, angle: float, length: float) -> tuple[float, float, float]:
-    """The middle of the front edge and SUMO's degrees to centre and radians in (-pi, pi]."""
-    o, half = (90.0 - angle) * RADIANS, length / 2  # SUMO's angles lie in [0, 360)
-    if o <= -math.pi:
-        o += 2 * math.pi
-    return x - half * math.cos(o), y - half * math.sin(o), o
 
 
 class World:
@@ -71,10 +54,12 @@ class World:
         self.scenario, self.site, self.ego = scenario, site, ego
         self.dt = scenario.step_length
         self.ego_body = Body(EGO, ego.kind)
+        self._persons = scenario.embodiment == "person"
         self._folder = TemporaryDirectory(prefix="cavsumo-")
         self._heard = (Path(self._folder.name) / "stderr.log").open("ab")
         self._types = Path(self._folder.name) / "types.add.xml"
-        self._types.write_text(_type_file(scenario, ego), encoding="utf-8")
+        self._types.write_text(type_file(scenario, ego), encoding="utf-8")
+        self._roaming: Roaming | None = None
         shapely.prepare(site.crossings)
 
     def __enter__(self) -> World:
@@ -89,16 +74,27 @@ class World:
         self._heard.close()
         self._folder.cleanup()
 
-    def reset(self, seed: int, states: Sequence[BodyState], starts: Sequence[Start]) -> Snapshot:
+    def reset(
+        self,
+        seed: int,
+        states: Sequence[BodyState],
+        starts: Sequence[Start],
+        *,
+        everything: bool = True,
+    ) -> Snapshot:
         """Start afresh and wait until the ego is on the road; the testers stand where given.
+
+        Args:
+            everything: show the whole background in every snapshot; else only those who may touch
+                the ego or a tester, which is all that contacts need.
 
         Raises SimulationError with SUMO's own words when it refuses, or when the ego finds no
         room to enter.
         """
         self.collisions: set[tuple[str, str]] = set()
         self.teleports = self.emergency_stops = 0
-        self._bodies: dict[str, Body] = {}
         self._driven: BodyState | None = None
+        self._told: dict[str, tuple[BodyState, tuple[float, float, float]]] = {}
         self._step, self._steering = 0, 0.0
         with self._listening():
             libsumo.close()
@@ -106,6 +102,7 @@ class World:
             self._insert(states, starts)
             ego = self._enter(states)
         self._ego = ego
+        self._background = self._lookout(everything, (ego, *states))
         return self._snapshot(ego, tuple(states))
 
     def step(self, states: tuple[BodyState, ...], command: Command) -> Snapshot | None:
@@ -206,25 +203,27 @@ class World:
 
     def _is_person(self, state: BodyState) -> bool:
         """Whether SUMO is shown a person; only pedestrians can be persons."""
-        return self.scenario.embodiment == "person" and state.body.kind.name == PEDESTRIAN.name
+        return self._persons and state.body.kind.name == PEDESTRIAN.name
 
     def _place(self, states: Sequence[BodyState]) -> None:
         """Tell SUMO where the testers are; every timestep, or it moves them itself."""
-        move, set_speed = libsumo.vehicle.moveToXY, libsumo.vehicle.setSpeed
-        persons = self.scenario.embodiment == "person"
+        move, told = libsumo.vehicle.moveToXY, self._told
         for state in states:
-            body, x, y, v, o = state
-            if not math.isfinite(x + y + v + o):  # SUMO hangs on an infinite angle
-                raise SimulationError(f"{body.id}: state is not finite: {x}, {y}, {v}, {o}")
-            x, y, angle = to_sumo(x, y, o, body.kind.length)
-            if persons and self._is_person(state):
+            name = state.body.id
+            known = told.get(name)
+            # A body that stands keeps its very record, and SUMO the speed that it was told.
+            fresh = known is None or known[0] is not state
+            if known is None or fresh:
+                known = told[name] = state, _front(state)
+            x, y, angle = known[1]
+            if self._persons and self._is_person(state):
                 on_crossing = shapely.contains_xy(self.site.crossings, x, y)
                 keep = KEEP_EXACT if on_crossing else KEEP_EXACT_ANY_LANE
-                libsumo.person.moveToXY(body.id, "", x, y, angle, keep, MATCH_M)
-            else:
-                move(body.id, "", -1, x, y, angle, KEEP_EXACT, MATCH_M)
-                # Followers would else see a speed that SUMO infers wrongly, by up to 6 m/s.
-                set_speed(body.id, v)
+                libsumo.person.moveToXY(name, "", x, y, angle, keep, MATCH_M)
+                continue
+            move(name, "", -1, x, y, angle, KEEP_EXACT, MATCH_M)
+            if fresh:  # followers would else see a speed that SUMO infers, wrong by up to 6 m/s
+                libsumo.vehicle.setSpeed(name, state.v)
 
     def _command_ego(self, command: Command) -> None:
         """Pass on what the ego does; None leaves it to SUMO."""
@@ -260,6 +259,8 @@ class World:
         SUMO turns a vehicle as its lane bends, also more sharply than its axles could.
         """
         kind, before = ego.body.kind, self._ego
+        if ego.o == before.o:
+            return 0.0
         turn = wrap(ego.o - before.o)
         try:
             steering = steering_for_turn(ego.v, turn, kind.wheelbase, self.dt) if turn else 0.0
@@ -269,35 +270,19 @@ class World:
 
     def _snapshot(self, ego: BodyState, states: tuple[BodyState, ...]) -> Snapshot:
         """Everything at this moment, the background as SUMO has it."""
-        mine = {EGO, *(s.body.id for s in states)}
-        raw: list[RawState] = []
-        known, cos, sin = self._bodies, math.cos, math.sin
         if self._driven is not None:
             self._vehicles = libsumo.vehicle.getIDList()
         persons = libsumo.person.getIDList()
-        for domain, ids in ((libsumo.vehicle, self._vehicles), (libsumo.person, persons)):
-            position, angle, speed = domain.getPosition, domain.getAngle, domain.getSpeed
-            for body_id in ids:
-                if body_id in mine:
-                    continue
-                body = known.get(body_id) or self._meet(body_id, domain)
-                # from_sumo, written out: this is the innermost loop of every timestep
-                x, y = position(body_id)
-                o = (90.0 - angle(body_id)) * RADIANS
-                if o <= -math.pi:
-                    o += 2 * math.pi
-                half = body.kind.length / 2
-                raw.append((body, x - half * cos(o), y - half * sin(o), speed(body_id), o))
+        raw = self._background.read(self._vehicles, persons, (ego, *states))
         time = round(self._step * self.dt, 6)
-        return Snapshot(self._step, time, ego, self._steering, states, tuple(raw))
+        return Snapshot(self._step, time, ego, self._steering, states, raw)
 
-    def _meet(self, body_id: str, domain: Any) -> Body:
-        """A background body seen for the first time."""
-        length, width = domain.getLength(body_id), domain.getWidth(body_id)
-        name = str(domain.getVehicleClass(body_id))
-        kind = Kind(name, length, width, 2 * length / 3, 0.0, math.inf, -math.inf, math.inf, 0.0)
-        self._bodies[body_id] = Body(body_id, kind)
-        return self._bodies[body_id]
+    def _lookout(self, everything: bool, watchers: Sequence[BodyState]) -> Background:
+        """The background of this episode; the network is measured when that first matters."""
+        if not everything and self._roaming is None:
+            self._roaming = roaming(libsumo.lane)
+        free = None if everything else self._roaming
+        return Background(libsumo.vehicle, libsumo.person, free, self.dt, watchers)
 
     def _collect_events(self) -> None:
         """SUMO's own reports, kept beside ours and never merged."""
@@ -309,20 +294,9 @@ class World:
         self.emergency_stops += len(simulation.getEmergencyStoppingVehiclesIDList())
 
 
-def _type_file(scenario: Scenario, ego: Ego) -> str:
-    """An additional file with the vehicle types of the ego and of the tester's bodies."""
-    types = [("cavsumo_ego", {"vClass": "passenger"} | ego.vtype())]
-    for kind in KINDS.values():
-        seen = scenario.sumo_width if kind is PEDESTRIAN else kind.width
-        shape = {"length": f"{kind.length}", "width": f"{seen}", "minGap": "0"}
-        shape |= {"guiShape": "passenger" if kind is CAR else kind.name}
-        types.append((f"cavsumo_{kind.name}", {"vClass": "passenger"} | shape))
-        if kind is PEDESTRIAN:
-            types.append(("cavsumo_person", {"vClass": "pedestrian"} | shape))
-    rows = [
-        f"  <vType id={quoteattr(name)} "
-        + " ".join(f"{k}={quoteattr(v)}" for k, v in attributes.items())
-        + "/>"
-        for name, attributes in types
-    ]
-    return "\n".join(["<additional>", *rows, "</additional>", ""])
+def _front(state: BodyState) -> tuple[float, float, float]:
+    """A state as SUMO is told it; raises SimulationError when it is not finite."""
+    body, x, y, v, o = state
+    if not math.isfinite(x + y + v + o):  # SUMO hangs on an infinite angle
+        raise SimulationError(f"{body.id}: state is not finite: {x}, {y}, {v}, {o}")
+    return to_sumo(x, y, o, body.kind.length)

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import dataclasses
 import math
 from collections.abc import Callable, Iterator, Sequence
+from random import Random
 from typing import Any
 
 import numpy as np
@@ -14,6 +16,7 @@ from shapely.affinity import rotate
 from shapely.geometry import LineString, Polygon, box
 
 from cavsumo.agents import AGENTS, Agent, Scene
+from cavsumo.agents.triggers import Timing
 from cavsumo.bodies import NOOP, PEDESTRIAN, Body
 from cavsumo.egos.base import EGO_KIND
 from cavsumo.geometry import corners, stopping_distances, zone_entered
@@ -184,6 +187,32 @@ def test_timing_steps_into_the_reaction_zone(
             assert zone == "reaction", start
             assert braking < ahead <= braking + aim * reaction + SPEED * dt, start
     assert entered.count("reaction") >= 0.6 * len(entered)
+
+
+@given(seed=st.integers(0, 10_000))
+@settings(max_examples=40, deadline=None)
+def test_the_timing_trigger_looks_away_only_when_it_cannot_hold(seed: int) -> None:
+    """Wherever the ego goes, beside its winding path too: the answer is that of one who looks."""
+    random = Random(seed)
+    bends = [(0.0, 0.0), (40.0, 0.0), (60.0, 25.0), (60.0, 60.0), (90.0, 60.0)]
+    roads = Roads(box(70.0, 55.0, 95.0, 65.0), [LineString([(70.0, 60.0), (95.0, 60.0)])])
+    starts = (Start(80.0, 53.0, 0.0),)
+    scene = Scene(0.1, Body("ego", EGO_KIND), Path(bends), (Body("t", PEDESTRIAN),), starts, roads)
+    lazy = Timing(scene, 0, 0.5)
+    state = BodyState(scene.bodies[0], 80.0, 53.0, 0.0, math.pi / 2)
+    v, spared = 8.0, 0
+    for step in range(400):
+        x, y, o = scene.ego_path.at(0.3 * step)
+        v = max(0.0, v + random.uniform(-1.0, 1.0))
+        x, y = x + random.uniform(-2.0, 2.0), y + random.uniform(-2.0, 2.0)
+        snapshot = Snapshot(step, 0.1 * step, BodyState(scene.ego, x, y, v, o), 0.0, (state,))
+        looks = Timing(dataclasses.replace(scene, _progress=[None, None]), 0, 0.5)
+        gap, least = looks.gap_at_entry(snapshot, state), lazy.least_gap(snapshot, state)
+        assert gap is not None
+        assert least <= abs(gap) + 1e-9
+        assert lazy(snapshot, state) == looks(snapshot, state)
+        spared += lazy._projected[:2] != (x, y)
+    assert spared > 50
 
 
 def test_timing_by_hand(straight_scene: MakeScene) -> None:

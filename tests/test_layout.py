@@ -17,13 +17,14 @@ PACKAGE = Path(cavsumo.__file__).parent
 # From the ground up: a module uses only what stands before it, lazily or not.
 ORDER = """
     cavsumo errors checks registry kinematics geometry paths bodies snapshot roads
+    sumo_poses background
     network ego_routes starts site scene
     agents.base agents.walking agents.triggers agents.random agents.features
     agents.programmed agents.election agents.qlearning agents
     contacts
     assertions.base assertions.collision assertions.reaction_zone assertions
     egos.base egos.constant egos.sumo egos.time_gap egos.controller egos
-    options scenario outcomes rewards world simulator
+    options scenario outcomes rewards sumo_types demand world simulator
     jobs setting theatre worker_process worker batch executors
     statistics tally stopping results recorder learning progress session
     summary interrupts replays listings

@@ -17,10 +17,15 @@ class Agent:
     """Base of the tester agents; on its own it does nothing at all.
 
     An agent lives as long as a batch: ``reset`` begins an episode, what it learned stays.
+
+    Attributes:
+        sees_background: whether it looks at the background traffic. Set False where it does not:
+            when nobody in an episode does, far bodies are left out of the snapshots.
     """
 
     PARAMETERS: ClassVar[Mapping[str, str]] = {}
     learns: bool = False  # whether episodes change what it knows: then they are played in sequence
+    sees_background: bool = True
 
     scene: Scene
     owned: tuple[int, ...]
@@ -73,3 +78,5 @@ AGENTS: Registry[Agent] = Registry("agent")
 @AGENTS.register("noop")
 class NoopAgent(Agent):
     """Does nothing: its bodies keep their speed and direction (the seed's noop)."""
+
+    sees_background = False

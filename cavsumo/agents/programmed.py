@@ -48,6 +48,8 @@ def idling(name: str, scene: Scene, index: int) -> Idle:
 class ProgrammedAgent(Agent):
     """Crosses the road when ``starts`` says so; the frame of Algorithms 3 to 5."""
 
+    sees_background = False
+
     def __init__(self, idle: str) -> None:
         self.idle = choice("idle", idle, ("pavement", "kerb", "noop"))
 
@@ -61,15 +63,16 @@ class ProgrammedAgent(Agent):
         raise NotImplementedError
 
     def choose_action(self, snapshot: Snapshot) -> tuple[Action, ...]:
-        return tuple(
-            self._choose(i, snapshot, snapshot.testers[j]) for i, j in enumerate(self.owned)
-        )
+        testers = snapshot.testers
+        return tuple([self._choose(i, snapshot, testers[j]) for i, j in enumerate(self.owned)])
 
     def _choose(self, i: int, snapshot: Snapshot, state: BodyState) -> Action:
         crossing = self.crossings[i]
-        if not crossing.active and self.starts(i, snapshot, state) and crossing.begin(state):
+        if crossing.crossing is None:
+            if not (self.starts(i, snapshot, state) and crossing.begin(state)):
+                return self._idles[i].action(state)
             self._idles[i] = DoNothing()  # beyond the road nothing of the start holds
-        return crossing.action(state) if crossing.active else self._idles[i].action(state)
+        return crossing.action(state)
 
 
 @AGENTS.register("programmed-random")

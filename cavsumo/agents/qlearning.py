@@ -32,6 +32,8 @@ from cavsumo.snapshot import Snapshot
 class QLearningAgent(Agent):
     """Algorithm 6: learns from episode to episode which walking targets lead to tests."""
 
+    sees_background = False
+
     PARAMETERS: ClassVar[Mapping[str, str]] = {
         "alpha": "learning rate in the first episode (0..1]",
         "gamma": "discount per second (0..1]; 1 for the undiscounted game",

@@ -36,6 +36,8 @@ class Exploration:
 class RandomAgent(Agent):
     """Algorithm 2: with probability epsilon a random action, else repeat it or do nothing."""
 
+    sees_background = False
+
     PARAMETERS: ClassVar[Mapping[str, str]] = {
         "rate_per_s": RATE_DOC,
         "epsilon": EPSILON_DOC,

@@ -7,7 +7,6 @@ from typing import Protocol
 
 from cavsumo.agents.walking import turn_radius
 from cavsumo.bodies import Kind
-from cavsumo.geometry import stopping_distances
 from cavsumo.kinematics import wrap
 from cavsumo.roads import Crossing
 from cavsumo.scene import Scene
@@ -17,6 +16,7 @@ from cavsumo.snapshot import BodyState, Snapshot
 MAX_DECEL, REACTION_TIME = 9.0, 0.675  # m/s2, s
 # The near end of the reaction zone is avoided by this share of it: the walk is only estimated.
 MARGIN = 0.1
+ROUNDING_M = 1e-6  # far above the rounding of any distance
 
 
 class Trigger(Protocol):
@@ -66,32 +66,57 @@ class Timing:
         self.way = scene.way(index)
         meeting = scene.ego_path.meet(start.x, start.y, self.way.heading) if self.way else None
         self.meeting = None if meeting is None else meeting[1]
+        self.point = scene.ego_path.at(self.meeting or 0.0)[:2]
+        self._projected = (math.inf, 0.0, 0.0)  # where the ego was, and how far from its path
         self._last: tuple[BodyState, float | None] | None = None
         # How far along its way the body's front touches the strip that the ego sweeps.
         reach = meeting[0] if meeting else 0.0
         self.strip = reach - scene.ego.kind.width / 2 - kind.length / 2
 
     def __call__(self, snapshot: Snapshot, state: BodyState) -> bool:
+        v = snapshot.ego.v
+        braking, reaction = 0.5 * v * v / MAX_DECEL, REACTION_TIME * v  # stopping_distances
+        most = braking + self.aim * reaction
+        if self.least_gap(snapshot, state) > most + ROUNDING_M:
+            return False
         gap = self.gap_at_entry(snapshot, state)
         if gap is None or gap <= 0.0:
             return False
-        braking, reaction = stopping_distances(
-            snapshot.ego.v, max_decel=MAX_DECEL, reaction_time=REACTION_TIME
-        )
-        return braking + MARGIN * reaction < gap <= braking + self.aim * reaction
+        return braking + MARGIN * reaction < gap <= most
+
+    def least_gap(self, snapshot: Snapshot, state: BodyState) -> float:
+        """A lower bound of the gap's size at entry that needs no projection on the path [m].
+
+        An arc is no shorter than its chord, so the ego's projection Q is at least |MQ| from the
+        meeting point M along the path, and |MQ| >= |M ego| - |ego Q|. The distance |ego Q| grows by
+        at most the way that the ego makes, measured from where it was last projected.
+        """
+        entry = self._entry(state)
+        if entry is None or self.meeting is None:
+            return math.inf
+        _, x, y, v, _ = snapshot.ego
+        mx, my = self.point
+        was_x, was_y, lateral = self._projected
+        chord = math.hypot(mx - x, my - y) - math.hypot(x - was_x, y - was_y) - lateral
+        return chord - state.body.kind.width / 2 - self.ego_half - v * (entry + self.scene.dt)
 
     def gap_at_entry(self, snapshot: Snapshot, state: BodyState) -> float | None:
         """Distance from the ego's front to the body as it enters the ego's strip [m]."""
-        if self.way is None or self.meeting is None:
+        entry = self._entry(state)
+        if entry is None or self.meeting is None:
             return None
-        ego = snapshot.ego
-        front = self.scene.ego_progress(snapshot) + self.ego_half
-        if self._last is None or self._last[0] != state:
-            self._last = state, self._time_to_enter(state, self.way)
-        entry = self._last[1]
-        if entry is None:
-            return None
+        ego, here = snapshot.ego, self.scene.ego_projection(snapshot)
+        self._projected = ego.x, ego.y, abs(here.lateral)
+        front = here.along + self.ego_half
         return self.meeting - state.body.kind.width / 2 - front - ego.v * (entry + self.scene.dt)
+
+    def _entry(self, state: BodyState) -> float | None:
+        """``_time_to_enter``, computed once for each state."""
+        if self.way is None:
+            return None
+        if self._last is None or self._last[0] is not state:
+            self._last = state, self._time_to_enter(state, self.way)
+        return self._last[1]
 
     def _time_to_enter(self, state: BodyState, way: Crossing) -> float | None:
         """How long a body that goes now takes to the ego's strip [s]; None beyond its edge."""
@@ -119,5 +144,7 @@ def detour(kind: Kind, o: float, heading: float) -> float:
 
     A body turning by phi on the radius R = b / (2 sin beta) walks R phi and gains R sin phi.
     """
+    if heading == o:
+        return 0.0
     phi = abs(wrap(heading - o))
     return turn_radius(kind) * (phi - math.sin(phi))

@@ -22,12 +22,12 @@ PAVEMENT_GAIN = 0.5  # how strongly a walker returns to its line on the pavement
 
 def turn_limit(kind: Kind, v: float, dt: float) -> float:
     """The largest turn that full steering makes in one timestep (seed, eq. 15) [rad]."""
-    return 2.0 * v * dt / kind.wheelbase * math.sin(math.atan(0.5 * math.tan(kind.steering_max)))
+    return 2.0 * v * dt / kind.wheelbase * kind.turning
 
 
 def turn_radius(kind: Kind) -> float:
     """Radius of the circle on which a body turns at full steering, b / (2 sin beta) [m]."""
-    return kind.wheelbase / (2.0 * math.sin(math.atan(0.5 * math.tan(kind.steering_max))))
+    return kind.wheelbase / (2.0 * kind.turning)
 
 
 def room_to_turn(kind: Kind, turn: float) -> float:
@@ -42,19 +42,24 @@ def room_to_turn(kind: Kind, turn: float) -> float:
 
 def steer_to(state: BodyState, heading: float, dt: float) -> float:
     """The steering angle that turns a body to a heading as fast as it can [rad]."""
-    turn = wrap(heading - state.o)
-    if abs(turn) < 1e-12 or state.v <= 0.0:
+    body, _, _, v, o = state
+    if heading == o or v <= 0.0:
         return 0.0
-    kind = state.body.kind
-    if abs(turn) >= turn_limit(kind, state.v, dt):
+    turn = wrap(heading - o)
+    if abs(turn) < 1e-12:
+        return 0.0
+    kind = body.kind
+    if abs(turn) >= turn_limit(kind, v, dt):
         return math.copysign(kind.steering_max, turn)
-    return steering_for_turn(state.v, turn, kind.wheelbase, dt)
+    return steering_for_turn(v, turn, kind.wheelbase, dt)
 
 
 def throttle_to(state: BodyState, speed: float, dt: float) -> float:
     """The throttle that brings a body to a speed as fast as it can [m/s2]."""
-    kind = state.body.kind
-    return min(kind.throttle_max, max(kind.throttle_min, (speed - state.v) / dt))
+    kind, throttle = state.body.kind, (speed - state.v) / dt
+    if throttle <= kind.throttle_min:
+        return kind.throttle_min
+    return kind.throttle_max if throttle > kind.throttle_max else throttle
 
 
 def walk(state: BodyState, heading: float, speed: float, dt: float) -> Action:
@@ -149,7 +154,7 @@ class ApproachKerb:
 
     def action(self, state: BodyState) -> Action:
         """The next action; most of the time the body stands, and nothing has changed."""
-        if self._last is None or self._last[0] != state:
+        if self._last is None or self._last[0] is not state:
             self._last = state, self._approach(state)
         return self._last[1]
 
@@ -163,10 +168,12 @@ class ApproachKerb:
             return walk(state, state.o, 0.0, self.dt)  # or it would creep on for ever
         # This timestep's way is walked at the old speed, whatever the throttle does.
         allowed = stopping_speed(kind, left - state.v * self.dt, self.dt)
+        if self.turning:
+            return walk(state, self.way.heading, allowed, self.dt)
         too_fast = state.v > allowed - kind.throttle_min * self.dt + 1e-9
-        if not self.turning:
+        if not too_fast:
             turn = abs(wrap(self.way.heading - state.o))
-            self.turning = not too_fast and left >= room_to_turn(kind, turn) + TURN_MARGIN_M
-        if not self.turning:
-            return walk(state, state.o, allowed if too_fast else 0.0, self.dt)
-        return walk(state, self.way.heading, allowed, self.dt)
+            self.turning = left >= room_to_turn(kind, turn) + TURN_MARGIN_M
+        if self.turning:
+            return walk(state, self.way.heading, allowed, self.dt)
+        return walk(state, state.o, allowed if too_fast else 0.0, self.dt)

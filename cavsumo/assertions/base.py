@@ -54,9 +54,12 @@ class Assertion:
         judgement: what it says so far.
         decided: nothing that follows can change the judgement.
         pending: the precondition held and the verdict is still open, so the episode goes on.
+        sees_background: whether it looks at the background traffic in the snapshots; contacts with
+            it are reported in any case. See ``Agent.sees_background``.
     """
 
     PARAMETERS: ClassVar[Mapping[str, str]] = {}
+    sees_background: bool = True
     name: ClassVar[str]
 
     judgement: Judgement

@@ -19,6 +19,7 @@ class CollisionAssertion(Assertion):
     """
 
     name: ClassVar[str] = "collision"
+    sees_background = False
 
     def reset(self, scene: Scene) -> None:
         super().reset(scene)

@@ -11,6 +11,7 @@ A body that touches the braking zone or the ego first makes the episode unfair.
 from __future__ import annotations
 
 import dataclasses
+import math
 from collections.abc import Mapping, Sequence
 from typing import ClassVar
 
@@ -24,7 +25,7 @@ from cavsumo.assertions.base import (
 )
 from cavsumo.checks import number
 from cavsumo.contacts import STANDING_MPS, Contact
-from cavsumo.geometry import in_frame, zone_entered
+from cavsumo.geometry import TOUCH, in_frame, zone_entered
 from cavsumo.scene import Scene
 from cavsumo.snapshot import BodyState, Snapshot
 
@@ -40,6 +41,7 @@ class ReactionZoneAssertion(Assertion):
     """
 
     name: ClassVar[str] = "reaction-zone"
+    sees_background = False
     PARAMETERS: ClassVar[Mapping[str, str]] = {
         "max_decel": "the deceleration that the zones assume [m/s2]",
         "reaction_time": "the reaction time that the zones assume [s]",
@@ -71,7 +73,16 @@ class ReactionZoneAssertion(Assertion):
         ego = snapshot.ego
         if ego.v <= STANDING_MPS:
             return
-        entered = [(self._zone(snapshot, tester), i) for i, tester in enumerate(snapshot.testers)]
+        far = self._far(ego)
+        entered = [
+            (self._zone(snapshot, tester), i)
+            for i, tester in enumerate(snapshot.testers)
+            # written out of _zone, which most bodies never get to
+            if abs(tester.x - ego.x) <= far + tester.body.kind.reach
+            and abs(tester.y - ego.y) <= far + tester.body.kind.reach
+        ]
+        if not entered:
+            return
         early = [i for zone, i in entered if zone in ("body", "braking")]
         fair = [i for zone, i in entered if zone == "reaction"]
         if early:
@@ -81,14 +92,18 @@ class ReactionZoneAssertion(Assertion):
             self._enter(snapshot, fair[0], HELD)
             self.pending, self._body = True, fair[0]
 
+    def _far(self, ego: BodyState) -> float:
+        """No zone, arcs included, leads farther from the ego's centre than this [m]."""
+        braking = 0.5 * ego.v * ego.v / self.max_decel
+        return ego.body.kind.reach + braking + self.reaction_time * ego.v
+
     def _zone(self, snapshot: Snapshot, tester: BodyState) -> str | None:
         """The zone that a body touches."""
-        ego, kind = snapshot.ego, tester.body.kind
-        # The zones end this far from the ego's centre at most, arcs included.
-        braking = 0.5 * ego.v * ego.v / self.max_decel
-        far = ego.body.kind.reach + braking + self.reaction_time * ego.v + kind.reach
-        if abs(tester.x - ego.x) > far or abs(tester.y - ego.y) > far:
-            return None
+        ego = snapshot.ego
+        if not snapshot.ego_steering:  # the zones are no wider than the ego
+            across = (tester.y - ego.y) * math.cos(ego.o) - (tester.x - ego.x) * math.sin(ego.o)
+            if abs(across) > ego.body.kind.width / 2 + tester.body.kind.reach + TOUCH:
+                return None
         return zone_entered(
             tester.box,
             ego.box,

@@ -37,12 +37,15 @@ class Ego:
     Attributes:
         kind: its box and limits.
         depart_speed: speed on entering the network [m/s]; None for as fast as SUMO finds safe.
+        sees_background: whether it looks at the background traffic in the snapshots. See
+            ``Agent.sees_background``.
     """
 
     PARAMETERS: ClassVar[Mapping[str, str]] = {}
 
     kind: Kind = EGO_KIND
     depart_speed: float | None = None
+    sees_background: bool = True
 
     def vtype(self) -> dict[str, str]:
         """The attributes of its SUMO vehicle type."""

@@ -15,6 +15,8 @@ from cavsumo.snapshot import Snapshot
 class ConstantEgo(Ego):
     """Keeps its speed and its route and brakes for nobody (CAV-Gym's ego)."""
 
+    sees_background = False
+
     PARAMETERS: ClassVar[Mapping[str, str]] = {"speed": "the speed it keeps [m/s]"}
 
     def __init__(self, speed: float = 6.75) -> None:

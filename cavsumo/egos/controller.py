@@ -45,6 +45,7 @@ class ControllerEgo(Ego):
         if speed is not None and not _within(speed, 0.0, self.kind.v_max):
             raise InputError(f"ego {spec}: depart_speed must lie in [0, {self.kind.v_max:g}] m/s")
         self.depart_speed = speed
+        self.sees_background = bool(getattr(self.controller, "sees_background", True))
 
     def reset(self, scene: Scene) -> None:
         self._sort: type | None = None

@@ -46,6 +46,8 @@ class SumoEgo(Ego):
     the stopping zones assume; ``actionStepLength=0`` gives it back.
     """
 
+    sees_background = False
+
     PARAMETERS: ClassVar[Mapping[str, str]] = {
         "carFollowModel": "car-following model: Krauss, IDM, EIDM, ACC, CACC, Wiedemann, ...",
         "actionStepLength": "time between two decisions of the driver [s]; 0 for every timestep",
