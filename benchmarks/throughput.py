@@ -28,7 +28,6 @@ from xml.etree import ElementTree
 import libsumo
 
 import cavsumo.simulator as simulator
-from cavsumo.commands import prepare
 from cavsumo.jobs import job
 from cavsumo.network import read_network
 from cavsumo.scenario import plan_from
@@ -56,7 +55,7 @@ def main() -> None:
             demand = plan_from(given, "benchmark").scenario.routes
             given["routes"] = str(wanderers(options.net, demand, options.cars, Path(folder)))
         plan = plan_from(given, "benchmark")
-        with Theatre(plan, prepare(plan)) as theatre:
+        with Theatre(plan, prepare(plan).site) as theatre:
             spent = compare(theatre, options.episodes)
             shares = parts(theatre, options.episodes)
     print(

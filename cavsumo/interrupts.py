@@ -26,7 +26,8 @@ class Interrupts:
     def __enter__(self) -> Interrupts:
         self._before = {}
         if threading.current_thread() is threading.main_thread():  # elsewhere Python has no signals
-            self._before = {s: signal.signal(s, self._heard) for s in SIGNALS}
+            heard = [s for s in SIGNALS if signal.getsignal(s) != signal.SIG_IGN]  # as by nohup
+            self._before = {s: signal.signal(s, self._heard) for s in heard}
         return self
 
     def __exit__(

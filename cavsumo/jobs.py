@@ -6,7 +6,7 @@ Imported by the parent process, so nothing here touches SUMO.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 
@@ -14,7 +14,7 @@ from cavsumo.agents import AGENTS, Agent
 from cavsumo.bodies import Body, kind_named, model_of
 from cavsumo.errors import UnknownName
 from cavsumo.outcomes import Outcome, Row
-from cavsumo.scenario import BatchPlan, Scenario
+from cavsumo.scenario import BatchPlan, Scenario, Simulation
 
 
 @dataclass(frozen=True)
@@ -35,7 +35,7 @@ class Job:
     seed: int
     memory: tuple[Any, ...] | None = None
     record: bool = False
-    simulation: Literal["own", "new", "same"] = "own"
+    simulation: Simulation = "own"
 
 
 def episode_seed(batch_seed: int, episode: int) -> int:

@@ -24,6 +24,8 @@ from cavsumo.errors import InputError, UnknownName
 
 SHARED_BY = 25  # episodes that share one simulation when asked to
 Finite = Annotated[float, Field(allow_inf_nan=False)]
+# Whose simulation an episode is played in: its own, or one that later episodes use as the same.
+Simulation = Literal["own", "new", "same"]
 Params = dict[str, bool | int | float | str]
 
 

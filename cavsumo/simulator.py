@@ -20,6 +20,7 @@ from cavsumo.errors import AgentError
 from cavsumo.kinematics import step_floats
 from cavsumo.rewards import Ledger
 from cavsumo.roads import Start
+from cavsumo.scenario import Simulation
 from cavsumo.scene import Scene
 from cavsumo.site import Site
 from cavsumo.snapshot import BodyState, Snapshot
@@ -69,15 +70,23 @@ class Episode:
     frames: list[Snapshot] = field(default_factory=list)
 
 
-def play(stage: Stage, agents: Sequence[Agent], seed: int, *, record: bool = False) -> Episode:
+def play(
+    stage: Stage,
+    agents: Sequence[Agent],
+    seed: int,
+    *,
+    record: bool = False,
+    simulation: Simulation = "own",
+) -> Episode:
     """One episode (Algorithm 1).
 
     Args:
         agents: one for each team, kept from episode to episode, so that learners learn.
         seed: of the episode; every random number in it comes from here.
         record: keep every snapshot.
+        simulation: whose it is played in (``World.reset``).
     """
-    scene, snapshot = _reset(stage, agents, seed, record)
+    scene, snapshot = _reset(stage, agents, seed, record, simulation)
     ledger = Ledger(scene, stage.teams)
     episode = Episode(Judgement(""))
     _observe(stage, episode, snapshot, record)
@@ -102,7 +111,7 @@ def play(stage: Stage, agents: Sequence[Agent], seed: int, *, record: bool = Fal
 
 
 def _reset(
-    stage: Stage, agents: Sequence[Agent], seed: int, record: bool
+    stage: Stage, agents: Sequence[Agent], seed: int, record: bool, simulation: Simulation
 ) -> tuple[Scene, Snapshot]:
     """Draw the starts and begin an episode; one generator for each who draws."""
     streams = np.random.SeedSequence(seed).spawn(2 + len(agents))
@@ -119,7 +128,9 @@ def _reset(
     )
     watching: list[Ego | Agent | Assertion] = [stage.ego, *agents, *stage.assertions]
     everything = record or any(who.sees_background for who in watching)
-    snapshot = stage.world.reset(seed, _states(stage, starts), starts, everything=everything)
+    snapshot = stage.world.reset(
+        seed, _states(stage, starts), starts, everything=everything, simulation=simulation
+    )
     for agent, team, rng in zip(agents, stage.teams, rest, strict=True):
         agent.reset(scene, team, rng)
     type(agents[0]).coordinate(agents, electing)

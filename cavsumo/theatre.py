@@ -55,7 +55,11 @@ class Theatre:
         try:
             agents = self._cast(job)
             episode = play(
-                self.stage, agents, job.seed, record=job.record or self.plan.trace != "none"
+                self.stage,
+                agents,
+                job.seed,
+                record=job.record or (self.plan.trace != "none" and job.simulation == "own"),
+                simulation=job.simulation,
             )
             row = _row(self.plan, job, episode)
             trace = self._trace(job, row, episode)
@@ -79,7 +83,7 @@ class Theatre:
 
     def _trace(self, job: Job, row: Row, episode: Episode) -> str:
         """The frames worth keeping: of tests found, or of every episode if asked."""
-        if job.record or (self.plan.trace == "tests" and episode.judgement.triggered):
+        if episode.frames and (job.record or episode.judgement.triggered):
             return trace_text(row, map(frame, episode.frames))
         return ""
 

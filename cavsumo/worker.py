@@ -17,11 +17,12 @@ import threading
 import time
 from collections.abc import Sequence
 from multiprocessing import Pipe
-from typing import Any, Literal
+from typing import Any
 
 from cavsumo.errors import BatchError, InputError
 from cavsumo.jobs import Job, failed
 from cavsumo.outcomes import Outcome, is_test
+from cavsumo.scenario import Simulation
 from cavsumo.setting import Setting
 from cavsumo.worker_process import GOODBYE
 
@@ -218,7 +219,7 @@ def play(setting: Setting, jobs: Sequence[Job]) -> list[Answer]:
     answers: list[Answer] = []
     for job in jobs:
         goes_on = bool(answers) and answers[-1][0].row["outcome"] != "error"
-        simulation: Literal["new", "same"] = "same" if goes_on else "new"
+        simulation: Simulation = "same" if goes_on else "new"
         answers.append(worker.play(dataclasses.replace(job, simulation=simulation)))
     return [
         worker.play(job) if is_test(answer[0].row) else answer

@@ -21,18 +21,20 @@ import shapely
 
 from cavsumo.background import Background, Roaming, roaming
 from cavsumo.bodies import PEDESTRIAN, Body
+from cavsumo.demand import Demand, Departures, Lights, cleared, noted, types_only
 from cavsumo.egos.base import Acceleration, Command, Drive, Ego
 from cavsumo.errors import NoSuchAction, SimulationError
 from cavsumo.kinematics import steering_for_turn, step_floats, wrap
 from cavsumo.options import OPTIONS
 from cavsumo.roads import Start
-from cavsumo.scenario import Scenario
+from cavsumo.scenario import Scenario, Simulation
 from cavsumo.site import Site
 from cavsumo.snapshot import BodyState, Snapshot
 from cavsumo.sumo_poses import from_sumo, to_sumo
 from cavsumo.sumo_types import type_file
 
 EGO = "ego"
+DEMAND_BEYOND_S = 60.0  # how far beyond the horizon demand is noted, for waits and overtime
 ENTRY_S = 30.0  # how long the ego may wait for room to enter the network
 KEEP_EXACT = 2  # moveToXY: exactly there, on the network or off it
 KEEP_EXACT_ANY_LANE = 6  # the same for persons, on lanes for cars too
@@ -58,8 +60,11 @@ class World:
         self._folder = TemporaryDirectory(prefix="cavsumo-")
         self._heard = (Path(self._folder.name) / "stderr.log").open("ab")
         self._types = Path(self._folder.name) / "types.add.xml"
+        self._kept = Path(self._folder.name) / "kept.add.xml"
         self._types.write_text(type_file(scenario, ego), encoding="utf-8")
         self._roaming: Roaming | None = None
+        self._demand: Demand | None = None
+        self._departures: Departures | None = None
         shapely.prepare(site.crossings)
 
     def __enter__(self) -> World:
@@ -81,10 +86,13 @@ class World:
         starts: Sequence[Start],
         *,
         everything: bool = True,
+        simulation: Simulation = "own",
     ) -> Snapshot:
-        """Start afresh and wait until the ego is on the road; the testers stand where given.
+        """Begin an episode and wait until the ego is on the road; the testers stand where given.
 
         Args:
+            simulation: "own" starts SUMO afresh, for the same bits whatever was before; "new"
+                starts one that serves several episodes, of which the later ones say "same".
             everything: show the whole background in every snapshot; else only those who may touch
                 the ego or a tester, which is all that contacts need.
 
@@ -97,8 +105,7 @@ class World:
         self._told: dict[str, tuple[BodyState, tuple[float, float, float]]] = {}
         self._step, self._steering = 0, 0.0
         with self._listening():
-            libsumo.close()
-            libsumo.start(self._command(seed))
+            self._begin(seed, simulation)
             self._insert(states, starts)
             ego = self._enter(states)
         self._ego = ego
@@ -115,7 +122,7 @@ class World:
         try:
             self._place(states)
             self._command_ego(command)
-            libsumo.simulationStep()
+            self._advance()
             self._collect_events()
             ego = self._read_ego() if self._driven is None else self._driven
         except (libsumo.TraCIException, libsumo.FatalTraCIError) as error:
@@ -128,11 +135,49 @@ class World:
         self._ego = ego
         return self._snapshot(ego, states)
 
-    def _command(self, seed: int) -> list[str]:
-        """The command line of SUMO."""
-        scenario, types = self.scenario, [*self.scenario.additional, self._types]
-        files = ["-n", str(scenario.net), "-a", ",".join(str(f) for f in types)]
-        if scenario.routes is not None:
+    def _begin(self, seed: int, simulation: Simulation) -> None:
+        """Start SUMO, or put it back to how it was when it started."""
+        if simulation == "same" and self._departures is not None:
+            cleared(libsumo)
+            self._lights.restore()
+            self._departures.begin()
+            return
+        self._departures = None
+        libsumo.close()
+        if simulation == "own":
+            libsumo.start(self._command(seed))
+        else:
+            self._start_shared(seed)
+        libsumo.route.add("cavsumo_ego", list(self.site.route.edges))
+        libsumo.route.add("cavsumo_tester", [self.site.route.edges[0]])
+
+    def _start_shared(self, seed: int) -> None:
+        """Start SUMO without the demand, which each episode then sends by itself."""
+        routes = self.scenario.routes
+        if self._demand is None:
+            self._demand = Demand()
+            if routes is not None:
+                self._kept.write_text(types_only(routes), encoding="utf-8")
+                libsumo.start(self._command(1))
+                self._demand = noted(libsumo, self.scenario.end + DEMAND_BEYOND_S)
+                libsumo.close()
+        libsumo.start(self._command(seed, shared=True))
+        self._lights = Lights(libsumo)
+        self._departures = Departures(libsumo, self._demand, self.dt)
+
+    def _advance(self) -> None:
+        """One timestep of SUMO."""
+        if self._departures is not None:
+            self._departures.send()
+        libsumo.simulationStep()
+
+    def _command(self, seed: int, *, shared: bool = False) -> list[str]:
+        """The command line of SUMO; of the demand only its types when it is sent by us."""
+        scenario, more = self.scenario, [*self.scenario.additional, self._types]
+        if shared and self._kept.exists():
+            more.append(self._kept)
+        files = ["-n", str(scenario.net), "-a", ",".join(str(f) for f in more)]
+        if scenario.routes is not None and not shared:
             files += ["-r", str(scenario.routes)]
         options = [word for k, v in OPTIONS.items() for word in (f"--{k}", v)]
         return [
@@ -164,7 +209,6 @@ class World:
     def _insert(self, states: Sequence[BodyState], starts: Sequence[Start]) -> None:
         """Add the ego and the testers, each at its place before the first timestep."""
         route = self.site.route
-        libsumo.route.add("cavsumo_ego", list(route.edges))
         speed = self.ego.depart_speed
         libsumo.vehicle.add(
             EGO,
@@ -175,7 +219,6 @@ class World:
             departSpeed="max" if speed is None else f"{speed}",
             arrivalPos=f"{route.arrive_m}",
         )
-        libsumo.route.add("cavsumo_tester", [route.edges[0]])
         for state, start in zip(states, starts, strict=True):
             if self._is_person(state):
                 edges = start.walk or route.edges
@@ -189,7 +232,7 @@ class World:
     def _enter(self, states: Sequence[BodyState]) -> BodyState:
         """Step until the ego has entered; the testers wait meanwhile."""
         for _ in range(max(2, round(ENTRY_S / self.dt))):
-            libsumo.simulationStep()
+            self._advance()
             ego = self._read_ego()
             if ego is not None:
                 for state in states:
