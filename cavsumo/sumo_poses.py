@@ -8,6 +8,9 @@ from __future__ import annotations
 
 import math
 
+from cavsumo.errors import SimulationError
+from cavsumo.snapshot import BodyState
+
 RADIANS = math.pi / 180.0
 
 
@@ -23,3 +26,11 @@ def from_sumo(x: float, y: float, angle: float, length: float) -> tuple[float, f
     if o <= -math.pi:
         o += 2 * math.pi
     return x - half * math.cos(o), y - half * math.sin(o), o
+
+
+def front(state: BodyState) -> tuple[float, float, float]:
+    """A state as SUMO is told it; raises SimulationError when it is not finite."""
+    body, x, y, v, o = state
+    if not math.isfinite(x + y + v + o):  # SUMO hangs on an infinite angle
+        raise SimulationError(f"{body.id}: state is not finite: {x}, {y}, {v}, {o}")
+    return to_sumo(x, y, o, body.kind.length)

@@ -30,7 +30,7 @@ from cavsumo.roads import Start
 from cavsumo.scenario import Scenario, Simulation
 from cavsumo.site import Site
 from cavsumo.snapshot import BodyState, Snapshot
-from cavsumo.sumo_poses import from_sumo, to_sumo
+from cavsumo.sumo_poses import from_sumo, front
 from cavsumo.sumo_types import type_file
 
 EGO = "ego"
@@ -257,7 +257,7 @@ class World:
             # A body that stands keeps its very record, and SUMO the speed that it was told.
             fresh = known is None or known[0] is not state
             if known is None or fresh:
-                known = told[name] = state, _front(state)
+                known = told[name] = state, front(state)
             x, y, angle = known[1]
             if self._persons and self._is_person(state):
                 on_crossing = shapely.contains_xy(self.site.crossings, x, y)
@@ -335,11 +335,3 @@ class World:
             self.collisions.add((a, b))
         self.teleports += len(simulation.getStartingTeleportIDList())
         self.emergency_stops += len(simulation.getEmergencyStoppingVehiclesIDList())
-
-
-def _front(state: BodyState) -> tuple[float, float, float]:
-    """A state as SUMO is told it; raises SimulationError when it is not finite."""
-    body, x, y, v, o = state
-    if not math.isfinite(x + y + v + o):  # SUMO hangs on an infinite angle
-        raise SimulationError(f"{body.id}: state is not finite: {x}, {y}, {v}, {o}")
-    return to_sumo(x, y, o, body.kind.length)

@@ -203,7 +203,7 @@ def test_the_timing_trigger_looks_away_only_when_it_cannot_hold(seed: int) -> No
     v, spared = 8.0, 0
     for step in range(400):
         x, y, o = scene.ego_path.at(0.3 * step)
-        v = max(0.0, v + random.uniform(-1.0, 1.0))
+        v = min(15.0, max(0.0, v + random.uniform(-1.0, 1.0)))
         x, y = x + random.uniform(-2.0, 2.0), y + random.uniform(-2.0, 2.0)
         snapshot = Snapshot(step, 0.1 * step, BodyState(scene.ego, x, y, v, o), 0.0, (state,))
         looks = Timing(dataclasses.replace(scene, _progress=[None, None]), 0, 0.5)
@@ -212,7 +212,7 @@ def test_the_timing_trigger_looks_away_only_when_it_cannot_hold(seed: int) -> No
         assert least <= abs(gap) + 1e-9
         assert lazy(snapshot, state) == looks(snapshot, state)
         spared += lazy._projected[:2] != (x, y)
-    assert spared > 50
+    assert spared > 20
 
 
 def test_timing_by_hand(straight_scene: MakeScene) -> None:

@@ -19,7 +19,8 @@ from cavsumo.kinematics import wrap
 from cavsumo.options import OPTIONS
 from cavsumo.roads import Start
 from cavsumo.snapshot import BodyState, Snapshot
-from cavsumo.world import World, from_sumo, to_sumo
+from cavsumo.sumo_poses import from_sumo, to_sumo
+from cavsumo.world import World
 
 Opener = Callable[..., World]
 EXACT = 1e-6  # m, rad

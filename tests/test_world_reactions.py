@@ -18,8 +18,9 @@ from cavsumo.kinematics import step_floats
 from cavsumo.roads import Start
 from cavsumo.snapshot import BodyState, Snapshot
 from cavsumo.starts import StartingArea
+from cavsumo.sumo_poses import to_sumo
 from cavsumo.worker import Worker
-from cavsumo.world import World, to_sumo
+from cavsumo.world import World
 
 Opener = Callable[..., World]
 LANE_Y = -1.825  # of the ego's lane on the straight road [m]
