@@ -31,6 +31,7 @@ import cavsumo.simulator as simulator
 from cavsumo.jobs import job
 from cavsumo.network import read_network
 from cavsumo.scenario import plan_from
+from cavsumo.setting import prepare
 from cavsumo.sumo_poses import to_sumo
 from cavsumo.theatre import Theatre
 from cavsumo.world import KEEP_EXACT, MATCH_M, UNSAFE, World
