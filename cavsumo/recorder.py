@@ -12,6 +12,7 @@ import fcntl
 import json
 import os
 from collections.abc import Iterator, Mapping
+from contextlib import suppress
 from io import FileIO
 from pathlib import Path
 from typing import Any
@@ -22,6 +23,7 @@ from cavsumo.results import FORMAT, HEADER, check_replaceable, trace_name, whole
 
 STARTING = "starting"  # a manifest that says so owns none of the rows that lie beside it
 RUNNING = "running"
+UNENCODABLE = "backslashreplace"  # file names may hold what is no Unicode
 
 
 class Recorder:
@@ -61,8 +63,9 @@ class Recorder:
         if not overwrite:
             check_replaceable(self.csv_file)
         try:
-            self.manifest, self._begun = dict(manifest), True
+            self.manifest = dict(manifest)
             self._write_manifest(STARTING)
+            self._begun = True
             self._file.truncate(0)
             self._remove_traces(after=-1)
             self._start_rows()
@@ -96,7 +99,7 @@ class Recorder:
     def write(self, outcome: Outcome) -> Row:
         """Append a row, its trace first; raises BatchError when the disk takes no more."""
         row = self._with_trace(outcome)
-        line = row_line(row).encode("utf-8")
+        line = _line(row)
         try:
             _write_all(self._file, line)
         except OSError as error:
@@ -117,7 +120,7 @@ class Recorder:
                 stream.write(old.readline())
                 for line in old:
                     row = rows.get(int(line.split(b",", 1)[0]))
-                    stream.write(line if row is None else row_line(row).encode("utf-8"))
+                    stream.write(line if row is None else _line(row))
                 stream.flush()
                 os.fsync(stream.fileno())
             new_file.replace(self.csv_file)
@@ -151,15 +154,17 @@ class Recorder:
         row = dict(outcome.row)
         name = trace_name(self.csv_file, row["run"])
         file = self.csv_file.parent / name
+        if self.traces and file.exists():  # a batch that has none has no folder to look into
+            file.unlink()
+            self.traces -= 1
         if not outcome.trace:
-            if self.traces:  # a batch that has none has no folder to look into
-                file.unlink(missing_ok=True)
             return row
         try:
             self.trace_folder.mkdir(exist_ok=True)
             file.write_text(outcome.trace, encoding="utf-8")
         except OSError as error:
-            file.unlink(missing_ok=True)
+            with suppress(OSError):
+                file.unlink()
             raise self._no_more(error) from error
         self.traces += 1
         return row | {"trace": name}
@@ -200,7 +205,7 @@ class Recorder:
         text = json.dumps(data, indent=1, ensure_ascii=False, allow_nan=False)
         new = self.manifest_file.with_name(f".{self.manifest_file.name}.new")
         try:
-            new.write_text(text + "\n", encoding="utf-8")
+            new.write_text(text + "\n", encoding="utf-8", errors=UNENCODABLE)
             new.replace(self.manifest_file)
         except OSError:
             new.unlink(missing_ok=True)
@@ -231,6 +236,11 @@ def _locked(file: Path) -> FileIO:
             raise ResultsError(f"results {str(file)!r}: another run is writing them") from error
         raise ResultsError(f"results {str(file)!r}: no lock: {error.strerror}") from error
     return stream
+
+
+def _line(row: Row) -> bytes:
+    """A row as it stands in the file."""
+    return row_line(row).encode("utf-8", errors=UNENCODABLE)
 
 
 def _write_all(file: FileIO, data: bytes) -> None:

@@ -12,7 +12,7 @@ from cavsumo.egos import make_ego
 from cavsumo.errors import CavsumoError
 from cavsumo.jobs import Job, episode_seed, failed, head, make_agents, teams, tester_bodies
 from cavsumo.outcomes import Outcome, Row, frame, trace_text
-from cavsumo.scenario import BatchPlan
+from cavsumo.scenario import BatchPlan, Simulation
 from cavsumo.simulator import Episode, Stage, play
 from cavsumo.site import Site
 from cavsumo.world import World
@@ -47,7 +47,8 @@ class Theatre:
 
     def rehearse(self) -> None:
         """Start SUMO once, so that what it refuses comes out before anything is written."""
-        self.stage.world.reset(episode_seed(self.plan.seed, 0), (), ())
+        simulation: Simulation = "own" if self.plan.reset == "fresh" else "new"
+        self.stage.world.reset(episode_seed(self.plan.seed, 0), (), (), simulation=simulation)
 
     def play(self, job: Job) -> tuple[Outcome, tuple[Any, ...] | None]:
         """Play a job: its outcome, and what the agents know afterwards if they learn."""

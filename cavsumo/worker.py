@@ -216,15 +216,20 @@ def play(setting: Setting, jobs: Sequence[Job]) -> list[Answer]:
     worker = _own_worker(setting)
     if setting.plan.reset == "fresh":
         return [worker.play(job) for job in jobs]
+    return [
+        worker.play(job) if is_test(answer[0].row) else answer
+        for job, answer in zip(jobs, search(worker, jobs), strict=True)
+    ]
+
+
+def search(worker: Worker, jobs: Sequence[Job]) -> list[Answer]:
+    """Play jobs one after another in one simulation; behind an error, in a new one."""
     answers: list[Answer] = []
     for job in jobs:
         goes_on = bool(answers) and answers[-1][0].row["outcome"] != "error"
         simulation: Simulation = "same" if goes_on else "new"
         answers.append(worker.play(dataclasses.replace(job, simulation=simulation)))
-    return [
-        worker.play(job) if is_test(answer[0].row) else answer
-        for job, answer in zip(jobs, answers, strict=True)
-    ]
+    return answers
 
 
 def rehearse(setting: Setting) -> None:
