@@ -66,10 +66,13 @@ def local_executor(jobs: int) -> Iterator[Executor]:
 @contextmanager
 def _dask(address: str) -> Iterator[tuple[Executor, int]]:
     """The workers of a dask scheduler."""
+    import dask
     from distributed import Client
 
+    dask.config.set({"distributed.comm.timeouts.connect": CONNECT_S})  # also to find it again
     connect: Any = Client
-    logging.getLogger("distributed").setLevel(logging.CRITICAL)  # it retries aloud, for minutes
+    for name in ("distributed", "distributed.client"):  # which retries aloud, for minutes
+        logging.getLogger(name).setLevel(logging.CRITICAL)
     try:
         client = connect(address, timeout=CONNECT_S)
     except (OSError, ValueError, TimeoutError) as error:

@@ -62,6 +62,14 @@ class Lessons:
             self.learned(outcome.row, memory)
         self.owed = []
 
+    def known(self) -> tuple[dict[str, Any], dict[str, int]]:
+        """What is known now, to be restored later."""
+        return dict(self.memories), dict(self.after)
+
+    def restore(self, known: tuple[dict[str, Any], dict[str, int]]) -> None:
+        """Know what was known then."""
+        self.memories, self.after = known
+
     def forget(self, names: Iterable[str]) -> None:
         """Let agents start anew."""
         for name in names:

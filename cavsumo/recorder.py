@@ -19,9 +19,8 @@ from typing import Any
 
 from cavsumo.errors import BatchError, ResultsError
 from cavsumo.outcomes import COLUMNS, Outcome, Row, row_line
-from cavsumo.results import FORMAT, HEADER, check_replaceable, trace_name, whole_lines
+from cavsumo.results import FORMAT, HEADER, STARTING, check_replaceable, trace_name, whole_lines
 
-STARTING = "starting"  # a manifest that says so owns none of the rows that lie beside it
 RUNNING = "running"
 UNENCODABLE = "backslashreplace"  # file names may hold what is no Unicode
 
@@ -175,9 +174,9 @@ class Recorder:
             if row is not None:
                 expected = next(todo, None)
                 if row["run"] != str(expected):
-                    due = "none" if expected is None else f"run {expected}"
+                    due = f"run {expected} is due" if expected is not None else "the batch is over"
                     raise ResultsError(
-                        f"results {str(self.csv_file)!r}: run {row['run']} where {due} is due"
+                        f"results {str(self.csv_file)!r}: run {row['run']} where {due}"
                     )
                 self._last = int(row["run"])
                 self.traces += bool(row["trace"])
@@ -196,7 +195,7 @@ class Recorder:
         if self.trace_folder.is_dir():
             for old in self.trace_folder.glob("run*.jsonl"):
                 number = old.stem.removeprefix("run")
-                if number.isdecimal() and int(number) > after:
+                if number.isdecimal() and len(number) >= 6 and int(number) > after:
                     old.unlink()
 
     def _write_manifest(self, status: str) -> None:

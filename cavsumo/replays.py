@@ -8,7 +8,7 @@ from typing import Any
 
 from cavsumo.errors import ResultsError
 from cavsumo.outcomes import COLUMNS, Row, cell
-from cavsumo.results import read_manifest, read_rows, read_trace
+from cavsumo.results import STARTING, read_manifest, read_rows, read_trace
 from cavsumo.scenario import BatchPlan
 
 # Columns that a replay does not reproduce: real time, and the file beside the row.
@@ -18,6 +18,8 @@ NOT_REPLAYED = ("wall_s", "trace")
 def recorded_plan(csv_file: Path) -> tuple[BatchPlan, dict[str, Any]]:
     """The plan of a batch, and its manifest."""
     manifest = read_manifest(csv_file)
+    if manifest.get("status") == STARTING:
+        raise ResultsError(f"results {str(csv_file)!r}: a batch that was killed as it started")
     try:
         return BatchPlan.model_validate(manifest["plan"]), manifest
     except (KeyError, ValueError) as error:

@@ -15,7 +15,8 @@ if TYPE_CHECKING:
     import pandas
 
 FORMAT = "cavsumo-results-1"
-COMPLETE = ("finished", "stopped", "starting")  # the statuses of which no row would be missed
+STARTING = "starting"  # a manifest that says so owns none of the rows that lie beside it
+COMPLETE = ("finished", "stopped", STARTING)  # the statuses of which no row would be missed
 FRAME_KEYS = {"step", "time_s", "ego", "steering", "testers", "background"}
 HEADER = ",".join(COLUMNS) + "\n"
 

@@ -35,6 +35,7 @@ class Session:
         quiet: no progress.
         tally: what was found, earlier sessions included.
         status: how the batch stands: finished, stopped (by a rule), interrupted or broken.
+        cut_short: whether somebody stopped it before all errors were played again.
     """
 
     setting: Setting
@@ -45,6 +46,7 @@ class Session:
     quiet: bool = True
     tally: Tally = field(default_factory=Tally)
     status: str = "broken"
+    cut_short: bool = False
 
     def begin(self, manifest: Mapping[str, Any], *, overwrite: bool = False) -> None:
         """Start the results file."""
@@ -88,6 +90,7 @@ class Session:
         An agent that learns missed a lesson then: it starts anew, and its later rows change too.
         """
         todo, pupils = _to_retry(self.recorder.csv_file, self.setting.plan, self._lessons.names)
+        known = self._lessons.known()
         self._lessons.forget(pupils)
         replaced: dict[int, Outcome] = {}
         with Progress(len(todo), self.quiet) as progress:
@@ -95,7 +98,9 @@ class Session:
                 self._lessons.learned(outcome.row, memory)
                 replaced[outcome.row["run"]] = outcome
                 progress.update(self.tally)
-        if len(replaced) < len(todo) and pupils:
+        self.cut_short = len(replaced) < len(todo)
+        if self.cut_short and pupils:
+            self._lessons.restore(known)
             raise BatchError("interrupted before the learning agents were done: nothing changed")
         self.recorder.replace(replaced)
         self.tally = Tally()

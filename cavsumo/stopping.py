@@ -7,10 +7,10 @@ the same row however many processes play.
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 from cavsumo.scenario import BatchPlan, half_width
-from cavsumo.tally import RATES, Tally
+from cavsumo.tally import RATES, Found, Tally
 
 Rule = Callable[[Tally], str | None]
 
@@ -26,7 +26,7 @@ def stopping_rule(plan: BatchPlan) -> Rule:
     if plan.until_tests is not None:
         rules.append(_enough_tests(plan.until_tests))
     if plan.until_half_width is not None:
-        rules.append(_narrow_enough(plan.until_half_width, plan.until_rate))
+        rules.append(_narrow_enough(plan.until_half_width, plan.until_rate, plan.agents))
     if plan.budget_s is not None:
         rules.append(_budget_spent(plan.budget_s))
     return lambda tally: next((said for rule in rules if (said := rule(tally))), None)
@@ -51,19 +51,19 @@ def _enough_tests(wanted: int) -> Rule:
     return rule
 
 
-def _narrow_enough(text: str, name: str) -> Rule:
+def _narrow_enough(text: str, name: str, agents: Sequence[str]) -> Rule:
     """Every agent's interval at most so wide to either side, on average."""
     assert name in RATES
     limit, relative = half_width(text)
 
     def rule(tally: Tally) -> str | None:
-        for found in tally.agents.values():
+        for found in (tally.agents.get(agent, Found()) for agent in agents):
             rate = found.rate(name, sequential=True)
             if rate.value is None or rate.low is None or rate.high is None:
                 return None
             if (rate.high - rate.low) / 2 > (limit * rate.value if relative else limit):
                 return None
-        return f"rate of {name} known to a half-width of {text}" if tally.agents else None
+        return f"rate of {name} known to a half-width of {text}"
 
     return rule
 

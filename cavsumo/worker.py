@@ -10,6 +10,8 @@ import contextlib
 import dataclasses
 import os
 import signal
+import socket
+import struct
 import subprocess
 import sys
 import tempfile
@@ -17,6 +19,7 @@ import threading
 import time
 from collections.abc import Sequence
 from multiprocessing import Pipe
+from multiprocessing.connection import Connection
 from typing import Any
 
 from cavsumo.errors import BatchError, InputError
@@ -26,7 +29,8 @@ from cavsumo.scenario import Simulation
 from cavsumo.setting import Setting
 from cavsumo.worker_process import GOODBYE
 
-STARTUP_S = 120.0  # imports and SUMO's first start, on a slow machine
+STARTUP_S = 60.0  # imports and SUMO's first start, on a slow machine
+STUCK_S = 20  # how long a message may stop half-way
 ATTEMPTS = 5  # to start a process that dies while it starts
 LIFETIME = 10_000  # episodes that one process plays; SUMO leaks a little with every restart
 Answer = tuple[Outcome, Any]  # an outcome, and what the agents know afterwards
@@ -89,7 +93,7 @@ class Worker:
                 refusal = self._receive(STARTUP_S)
             except _Gone as gone:
                 self._stop()
-                refusal = f"SUMO cannot load this scenario: {gone}"
+                refusal = f"the simulation cannot be started: {gone}"
             else:
                 if refusal is None:
                     return
@@ -125,6 +129,7 @@ class Worker:
         self._folder = tempfile.TemporaryDirectory(prefix="cavsumo-worker-")
         self._log = tempfile.TemporaryFile()  # noqa: SIM115  # lives as long as the process
         self._pipe, theirs = Pipe()
+        _limit(self._pipe)
         fds = theirs.fileno(), self._log.fileno()
         numbers = (*fds, os.getpid())
         environment = os.environ | {
@@ -157,6 +162,8 @@ class Worker:
         try:
             if self._pipe.poll(deadline):
                 return self._pipe.recv()
+        except BlockingIOError:  # it began to answer
+            raise _Gone(f"stuck in its answer for {STUCK_S} s, killed") from None
         except (EOFError, OSError):
             raise _Gone(self._end() + self._last_words()) from None
         raise _Gone(f"no answer within {deadline:g} s, killed")
@@ -169,7 +176,8 @@ class Worker:
         except subprocess.TimeoutExpired:
             return "the simulation process closed its pipe, killed"
         if code < 0:
-            return f"the simulation process died of {signal.Signals(-code).name}"
+            names = {s.value: s.name for s in signal.Signals}
+            return f"the simulation process died of {names.get(-code, f'signal {-code}')}"
         return f"the simulation process ended with status {code}"
 
     def _last_words(self) -> str:
@@ -192,6 +200,13 @@ class Worker:
 
 class _Gone(Exception):
     """The process died or was killed; the message says how."""
+
+
+def _limit(pipe: Connection) -> None:
+    """Let neither a send nor the rest of an answer wait for a stopped process for ever."""
+    with socket.socket(fileno=os.dup(pipe.fileno())) as end:
+        for option in (socket.SO_RCVTIMEO, socket.SO_SNDTIMEO):
+            end.setsockopt(socket.SOL_SOCKET, option, struct.pack("ll", STUCK_S, 0))
 
 
 def _kill(process: subprocess.Popen[bytes]) -> None:

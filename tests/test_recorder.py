@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from support import content
 
 from cavsumo.errors import BatchError, ResultsError
 from cavsumo.outcomes import COLUMNS, Outcome
@@ -44,12 +45,6 @@ def resume(file: Path, runs: int = RUNS) -> list[str]:
             recorder.write(outcome(run))
         recorder.finish("finished", {})
     return there
-
-
-def content(folder: Path) -> dict[str, bytes]:
-    """Every file of a folder with its bytes."""
-    files = (file for file in folder.rglob("*") if file.is_file())
-    return {str(file.relative_to(folder)): file.read_bytes() for file in files}
 
 
 @pytest.fixture
@@ -297,7 +292,7 @@ def edited(text: bytes, number: int, line: bytes) -> bytes:
         (3, b"-1" + COMMAS + b"\n", "line 3 begins with '-1'"),
         (3, b"2" + COMMAS + b"\n", "run 2 where run 1 is due"),
         (3, b"0" + COMMAS + b"\n", "run 0 where run 1 is due"),
-        (5, b"3" + COMMAS + b"\n4" + COMMAS + b"\n", "run 4 where none is due"),
+        (5, b"3" + COMMAS + b"\n4" + COMMAS + b"\n", "run 4 where the batch is over"),
     ],
 )
 def test_damage_is_named_and_nothing_is_changed(

@@ -98,7 +98,7 @@ def _play(session: Session, manner: Manner) -> None:
 def _exit_status(session: Session, interrupted: bool, exit_zero: bool) -> int:
     """130 interrupted, 3 an episode could not be run, 1 the ego violated an assertion, else 0."""
     found = session.tally.all
-    if interrupted and session.status == "interrupted":
+    if interrupted and (session.cut_short or session.status == "interrupted"):
         return Exit.INTERRUPTED
     if found.errors:
         return Exit.NOT_RUN
@@ -122,9 +122,9 @@ def _recorded(output: Path, manner: Manner) -> dict[str, Any] | None:
     """
     if not (manner.resume or manner.retry_errors):
         return None
-    nothing = not output.exists() and not output.with_suffix(".json").exists()
-    if nothing and manner.resume:
-        return None
+    rows = output.is_file() and output.stat().st_size > 0
+    if manner.resume and not rows and not output.with_suffix(".json").exists():
+        return None  # a kill may leave an empty file
     return read_manifest(output)
 
 

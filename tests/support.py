@@ -1,0 +1,73 @@
+"""What several test files use to look at batches and at the processes that play them."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from concurrent.futures import Executor, Future
+from pathlib import Path
+from typing import Any
+
+from cavsumo.results import read_rows
+from cavsumo.setting import Setting
+
+PATIENCE_S = 60.0
+
+
+def rows(file: Path) -> list[dict[str, str]]:
+    """The rows without the real time."""
+    return [{k: v for k, v in row.items() if k != "wall_s"} for row in read_rows(file)]
+
+
+def traces(file: Path) -> dict[str, str]:
+    """The traces by name."""
+    return {f.name: f.read_text(encoding="utf-8") for f in file.with_suffix("").glob("*")}
+
+
+def content(folder: Path) -> dict[str, bytes]:
+    """Every file of a folder with its bytes."""
+    files = (file for file in folder.rglob("*") if file.is_file())
+    return {str(file.relative_to(folder)): file.read_bytes() for file in files}
+
+
+def until(happened: Callable[[], Any], what: str) -> None:
+    """Wait until something is so, not for ever."""
+    end = time.monotonic() + PATIENCE_S
+    while not happened():
+        assert time.monotonic() < end, f"waited in vain until {what}"
+        time.sleep(0.01)
+
+
+def workers_of(parent: int) -> dict[int, str]:
+    """The simulating children of a process, each with the time of its start."""
+    found = {}
+    for folder in Path("/proc").glob("[0-9]*"):
+        try:
+            command = (folder / "cmdline").read_bytes()
+            fields = (folder / "stat").read_text().rpartition(")")[2].split()
+        except OSError:  # gone meanwhile
+            continue
+        if int(fields[1]) == parent and b"cavsumo.worker_process" in command:
+            found[int(folder.name)] = fields[19]
+    return found
+
+
+def alive(pid: int, started: str | None = None) -> bool:
+    """Whether a process runs (and is the one started then); one not yet buried does not."""
+    try:
+        fields = Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()
+    except OSError:
+        return False
+    return fields[0] not in "ZX" and started in (None, fields[19])
+
+
+class Troupe(Executor):
+    """Processes that stay for all batches of one setting, whatever their shards and rules."""
+
+    def __init__(self, own: Setting, executor: Executor) -> None:
+        self.own, self.executor = own, executor
+
+    def submit(self, fn: Callable[..., Any], /, *args: Any, **kwargs: Any) -> Future[Any]:
+        """Have episodes played as some of the whole batch."""
+        _, jobs = args
+        return self.executor.submit(fn, self.own, jobs)

@@ -1,0 +1,295 @@
+"""Wherever episodes are played, in threads, processes or on a cluster: the same rows."""
+
+from __future__ import annotations
+
+import multiprocessing
+import os
+import signal
+import socket
+import subprocess
+import sys
+import threading
+import time
+from collections.abc import Callable, Iterator
+from concurrent.futures import Executor, ProcessPoolExecutor, ThreadPoolExecutor
+from pathlib import Path
+from typing import Any
+
+import pytest
+from support import PATIENCE_S, rows, until
+
+from cavsumo.batch import run_batch
+from cavsumo.cli import main
+from cavsumo.errors import BatchError
+from cavsumo.executors import Means, local_executor, opened
+from cavsumo.outcomes import Outcome
+from cavsumo.results import read_manifest
+from cavsumo.scenario import plan_from
+from cavsumo.setting import Setting, prepare
+from cavsumo.worker import close_all
+
+RUNS = 6
+WORDS = f"-r none --agent timing --agent q-learning --testers 2 --end 8 --runs {RUNS} -q".split()
+
+
+def lasting(outcome: Outcome) -> tuple[dict[str, Any], str]:
+    """A row without the real time it took, and the trace."""
+    return {key: value for key, value in outcome.row.items() if key != "wall_s"}, outcome.trace
+
+
+@pytest.fixture(scope="module")
+def setting(networks: dict[str, Path]) -> Setting:
+    """An agent that learns and one that does not, with traces."""
+    chosen = {"net": networks["crossing"], "routes": "none", "end": 8.0, "runs": RUNS}
+    chosen |= {"agents": ["timing", "q-learning"], "testers": 2}
+    return prepare(plan_from(chosen, "test"))
+
+
+@pytest.fixture(scope="module")
+def quiet(setting: Setting) -> list[Any]:
+    """What comes out of one process, episode by episode."""
+    with local_executor(1) as executor:
+        return played(setting, executor)
+
+
+def played(setting: Setting, executor: Executor) -> list[Any]:
+    """What comes out of an executor: rows, traces and what was learned, in order."""
+    batch = run_batch(setting, executor, setting.plan.todo())
+    return [(lasting(outcome), memory) for outcome, memory in batch]
+
+
+def quiet_rows(quiet: list[Any], upto: int | None = None) -> list[tuple[str, str, str]]:
+    """Run, outcome and reward of the quiet batch, as they are compared with a file."""
+    return [
+        (str(row["run"]), row["outcome"], f"{row['reward']:.3f}") for (row, _), _ in quiet[:upto]
+    ]
+
+
+def file_rows(file: Path) -> list[tuple[str, str, str]]:
+    """The same of a file."""
+    return [(row["run"], row["outcome"], row["reward"]) for row in rows(file)]
+
+
+# Processes of this machine ------------------------------------------------------------------------
+
+
+def test_two_at_a_time_play_what_one_plays(setting: Setting, quiet: list[Any]) -> None:
+    """-j 2 changes nothing but the time it takes."""
+    with opened(Means(jobs=2)) as (executor, jobs):
+        assert jobs == 2
+        assert played(setting, executor) == quiet
+
+
+def test_a_plain_thread_pool_will_do(setting: Setting, quiet: list[Any]) -> None:
+    """Any executor of the standard library can be given, as others keep to its interface."""
+    try:
+        with ThreadPoolExecutor(3) as executor:
+            assert played(setting, executor) == quiet
+    finally:
+        close_all()
+
+
+def test_a_plain_process_pool_will_do(setting: Setting, quiet: list[Any]) -> None:
+    """All that is sent there and back can be pickled."""
+    with ProcessPoolExecutor(2, multiprocessing.get_context("spawn")) as executor:
+        assert played(setting, executor) == quiet
+
+
+def test_an_executor_that_is_shut_down_is_one_sentence(setting: Setting) -> None:
+    """Nothing is played, and nobody waits for it."""
+    executor = ThreadPoolExecutor(1)
+    executor.shutdown()
+    with pytest.raises(BatchError, match="takes no more episodes"):
+        played(setting, executor)
+
+
+# Words that make no sense -------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        ("-j 0", "jobs: expected a number of at least 1, got 0"),
+        ("-j -1", "jobs: expected a number of at least 1, got -1"),
+        ("-j two", "invalid int value: 'two'"),
+        ("--executor dask", "--executor dask and --scheduler ADDRESS go together"),
+        ("--scheduler tcp://127.0.0.1:1", "--executor dask and --scheduler ADDRESS go together"),
+        ("--executor slurm", "invalid choice: 'slurm'"),
+    ],
+)
+def test_means_that_make_no_sense_are_refused(
+    networks: dict[str, Path],
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+    words: str,
+    said: str,
+) -> None:
+    """Exit 2 and one sentence before anything starts."""
+    monkeypatch.chdir(tmp_path)
+    assert main(["run", "-n", str(networks["pedestrians"]), *words.split()]) == 2
+    printed = capsys.readouterr().err
+    assert said in printed
+    assert printed.count("\n") == 1
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_two_runs_never_write_one_file(
+    networks: dict[str, Path],
+    quiet: list[Any],
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    """The second is refused, however it asks, and the first ends as if it had been alone."""
+    monkeypatch.chdir(tmp_path)
+    words = ["run", "-n", str(networks["crossing"]), *WORDS, "-o", "r.csv"]
+    first = subprocess.Popen([sys.executable, "-m", "cavsumo", *words])
+    file = tmp_path / "r.csv"
+    try:
+        until(lambda: file.is_file() and file.read_bytes().count(b"\n") > 1, "there is a row")
+        first.send_signal(signal.SIGSTOP)  # so that it is there as long as the second one
+        for more in ([], ["--resume"], ["--overwrite"]):
+            assert main([*words, *more]) == 2
+            assert "'r.csv': another run is writing them" in capsys.readouterr().err
+        first.send_signal(signal.SIGCONT)
+        assert first.wait(PATIENCE_S) in (0, 1)
+    finally:
+        first.kill()
+        first.wait()
+    assert file_rows(file) == quiet_rows(quiet)
+    assert read_manifest(file)["status"] == "finished"
+
+
+# dask ---------------------------------------------------------------------------------------------
+
+
+def new_cluster() -> Any:
+    """Two dask workers of one thread each."""
+    distributed = pytest.importorskip("distributed")
+    return distributed.LocalCluster(
+        n_workers=2,
+        threads_per_worker=1,
+        processes=True,
+        dashboard_address=None,
+        host="127.0.0.1",
+        silence_logs=50,
+    )
+
+
+@pytest.fixture(scope="module")
+def cluster() -> Iterator[Any]:
+    """A cluster for several tests."""
+    with new_cluster() as cluster:
+        yield cluster
+
+
+@pytest.fixture
+def dask_words(networks: dict[str, Path]) -> Callable[[Any], list[str]]:
+    """Call with a cluster for the words that play the batch there."""
+
+    def words(cluster: Any) -> list[str]:
+        there = ["--executor", "dask", "--scheduler", cluster.scheduler_address]
+        return ["run", "-n", str(networks["crossing"]), *WORDS, *there]
+
+    return words
+
+
+def test_dask_plays_what_one_process_plays(
+    setting: Setting, quiet: list[Any], cluster: Any
+) -> None:
+    """Rows, traces and what was learned; as many at a time as the cluster has threads."""
+    with opened(Means(None, "dask", cluster.scheduler_address)) as (executor, jobs):
+        assert jobs == 2
+        assert played(setting, executor) == quiet
+
+
+def test_a_dask_worker_that_is_killed_loses_nothing(
+    quiet: list[Any],
+    cluster: Any,
+    dask_words: Callable[[Any], list[str]],
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """A node fails in mid-batch: its episodes are played by another, with the same rows."""
+    monkeypatch.chdir(tmp_path)
+    killed: list[int] = []
+
+    def kill() -> None:
+        end = time.monotonic() + PATIENCE_S
+        while time.monotonic() < end:
+            if Path("results.csv").is_file() and Path("results.csv").read_bytes().count(b"\n") > 2:
+                pid = next(iter(cluster.workers.values())).pid
+                os.kill(pid, signal.SIGKILL)
+                killed.append(pid)
+                return
+            time.sleep(0.01)
+
+    killer = threading.Thread(target=kill)
+    killer.start()
+    assert main(dask_words(cluster)) in (0, 1)
+    killer.join()
+    assert killed
+    assert file_rows(Path("results.csv")) == quiet_rows(quiet)
+
+
+def test_a_cluster_that_goes_in_mid_batch_keeps_the_rows(
+    quiet: list[Any],
+    dask_words: Callable[[Any], list[str]],
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """The scheduler's time is up: exit 3, whole rows, and --resume ends it on this machine."""
+    monkeypatch.chdir(tmp_path)
+    file = Path("results.csv")
+    with new_cluster() as cluster:
+        line = [sys.executable, "-m", "cavsumo", *dask_words(cluster)]
+        with Path("stderr").open("wb") as stderr:
+            process = subprocess.Popen(line, stderr=stderr)
+        until(lambda: file.is_file() and file.read_bytes().count(b"\n") > 2, "there are rows")
+        process.send_signal(signal.SIGSTOP)  # so that the batch is not over before the cluster is
+        time.sleep(0.1)
+    process.send_signal(signal.SIGCONT)
+    try:
+        assert process.wait(2 * PATIENCE_S) == 3, Path("stderr").read_text()
+    finally:
+        process.kill()
+        process.wait()
+    said = Path("stderr").read_text()
+    assert "Traceback" not in said
+    assert "cavsumo: the executor" in said.splitlines()[-1]
+    assert read_manifest(file)["status"] == "broken"
+    there = file_rows(file)
+    assert 0 < len(there) < 2 * RUNS
+    assert there == quiet_rows(quiet, len(there))
+    assert main(["run", "--resume", "-q"]) in (0, 1)
+    assert file_rows(file) == quiet_rows(quiet)
+
+
+def free_port() -> int:
+    """A port that nobody listens on."""
+    with socket.socket() as some:
+        some.bind(("127.0.0.1", 0))
+        port: int = some.getsockname()[1]
+        return port
+
+
+@pytest.mark.parametrize("address", ["tcp://127.0.0.1:PORT", "nonsense://127.0.0.1:1"])
+def test_a_scheduler_that_is_not_there_is_one_sentence(
+    networks: dict[str, Path],
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+    address: str,
+) -> None:
+    """Exit 2 after a while, and nothing is written."""
+    pytest.importorskip("distributed")
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr("cavsumo.executors.CONNECT_S", 2.0)
+    there = address.replace("PORT", str(free_port()))
+    words = ["--executor", "dask", "--scheduler", there]
+    assert main(["run", "-n", str(networks["pedestrians"]), *words]) == 2
+    printed = capsys.readouterr().err
+    assert f"scheduler {there!r}: cannot be reached" in printed
+    assert printed.count("\n") == 1
+    assert list(tmp_path.iterdir()) == []
