@@ -17,6 +17,7 @@ from pydantic import (
     ConfigDict,
     Field,
     ValidationError,
+    ValidationInfo,
     field_validator,
 )
 
@@ -110,18 +111,11 @@ class BatchPlan(BaseModel):
         """A number in a scenario file means the same as on the command line."""
         return f"{value}" if isinstance(value, int | float) else value
 
-    @field_validator("until_half_width")
+    @field_validator("until_half_width", "shard")
     @classmethod
-    def _a_half_width(cls, value: str | None) -> str | None:
+    def _well_formed(cls, value: str | None, info: ValidationInfo) -> str | None:
         if value is not None:
-            half_width(value)
-        return value
-
-    @field_validator("shard")
-    @classmethod
-    def _a_part(cls, value: str | None) -> str | None:
-        if value is not None:
-            part_of(value)
+            part_of(value) if info.field_name == "shard" else half_width(value)
         return value
 
     @property

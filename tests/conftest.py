@@ -14,6 +14,7 @@ from shapely.geometry import LineString, box
 
 from cavsumo.agents.base import Scene
 from cavsumo.bodies import PEDESTRIAN, Body, Kind
+from cavsumo.cli import main
 from cavsumo.egos import make_ego
 from cavsumo.egos.base import EGO_KIND
 from cavsumo.paths import Path as Polyline
@@ -110,6 +111,26 @@ def controller(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Call
     yield write
     for name in made:
         sys.modules.pop(name, None)
+
+
+@pytest.fixture
+def refused(
+    networks: dict[str, Path],
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> Callable[..., str]:
+    """Call with options of ``cavsumo run``: it must say no in one sentence, which is returned."""
+
+    def no(*words: str) -> str:
+        monkeypatch.chdir(tmp_path)
+        assert main(["run", "-n", str(networks["pedestrians"]), *words]) == 2
+        said = capsys.readouterr().err
+        assert said.count("\n") == 1, said
+        assert list(tmp_path.iterdir()) == [], "something was written"
+        return said
+
+    return no
 
 
 @pytest.fixture(scope="session")

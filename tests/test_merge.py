@@ -208,21 +208,11 @@ def test_what_makes_no_whole_is_not_merged(
 
 
 @pytest.mark.parametrize("shard", ["0/2", "3/2", "x", "1/0", "1", "-1/2", "1/2/3", "1.0/2", ""])
-def test_a_shard_that_is_none_is_refused(
-    networks: Mapping[str, Path],
-    tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
-    capsys: pytest.CaptureFixture[str],
-    shard: str,
-) -> None:
+def test_a_shard_that_is_none_is_refused(refused: Callable[..., str], shard: str) -> None:
     """One sentence that says what a shard looks like, and no file."""
-    monkeypatch.chdir(tmp_path)
-    assert main(["run", "-n", str(networks["pedestrians"]), f"--shard={shard}"]) == 2
-    printed = capsys.readouterr().err
+    printed = refused(f"--shard={shard}")
     assert "shard: must be I/N with 1 <= I <= N, such as 2/8" in printed
     assert repr(shard) in printed
-    assert printed.count("\n") == 1
-    assert list(tmp_path.iterdir()) == []
 
 
 @pytest.mark.parametrize(
@@ -236,21 +226,10 @@ def test_a_shard_that_is_none_is_refused(
     ],
 )
 def test_a_shard_of_what_goes_in_sequence_is_refused(
-    networks: Mapping[str, Path],
-    tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
-    capsys: pytest.CaptureFixture[str],
-    words: str,
-    said: str,
+    refused: Callable[..., str], words: str, said: str
 ) -> None:
     """Who learns, or stops by what was found, needs all episodes before: parts would differ."""
-    monkeypatch.chdir(tmp_path)
-    line = ["run", "-n", str(networks["pedestrians"]), "--shard", "1/2", *words.split()]
-    assert main(line) == 2
-    printed = capsys.readouterr().err
-    assert said in printed
-    assert printed.count("\n") == 1
-    assert list(tmp_path.iterdir()) == []
+    assert said in refused("--shard", "1/2", *words.split())
 
 
 def test_a_shard_can_be_played_by_the_command_line(
