@@ -21,7 +21,6 @@ from cavsumo.options import OPTIONS
 from cavsumo.scenario import BatchPlan
 from cavsumo.site import Site, derive_site
 
-ON_PAVEMENTS = ("pedestrian", "bicycle")  # kinds of body that may start there
 # Settings that say how much of a batch to play and not what its episodes are.
 EXTENT = frozenset(
     {"runs", "deadline_s", "first", "until_tests", "until_half_width", "until_rate", "budget_s"}
@@ -64,11 +63,7 @@ def prepare(plan: BatchPlan) -> Setting:
     check_agents(plan)
     for name in scenario.assertions:
         ASSERTIONS.make(name, scenario.assertion_params)
-    if kind_named(scenario.kind).name not in ON_PAVEMENTS:
-        raise InputError(
-            f"kind {scenario.kind!r}: testers start on pavements, where only "
-            f"{' and '.join(ON_PAVEMENTS)} can be"
-        )
+    kind_named(scenario.kind)
     if learners(plan) and (plan.shard or plan.reset == "shared"):
         what = f"shard {plan.shard}" if plan.shard else "reset shared"
         raise InputError(

@@ -22,6 +22,8 @@ from cavsumo.stopping import looks_at_rows
 from cavsumo.summary import summarise
 from cavsumo.worker import rehearse
 
+ON_PAVEMENTS = ("pedestrian", "bicycle")  # kinds of body that may start there
+
 
 @dataclass(frozen=True)
 class Manner:
@@ -48,6 +50,7 @@ def run(settings: Mapping[str, Any], output: Path, means: Means, manner: Manner)
     recorded = _recorded(output, manner)
     plan = plan_from({**_settings_of(recorded), **settings}, "run")
     setting = prepare(plan)
+    _check_kind(plan.scenario.kind)
     now = manifest(setting)
     _check_same(output, recorded, now)
     with opened(means) as (executor, jobs), Interrupts(manner.quiet) as interrupts:
@@ -113,6 +116,15 @@ def _check_output(output: Path) -> None:
         raise InputError(f"output {str(output)!r}: expected a name that ends in .csv")
     if output.is_dir() or output.with_suffix("").is_file():
         raise InputError(f"output {str(output)!r}: its place is taken")
+
+
+def _check_kind(kind: str) -> None:
+    """Refuse testers that could not start anywhere."""
+    if kind not in ON_PAVEMENTS:
+        raise InputError(
+            f"kind {kind!r}: testers start on pavements, where only {' and '.join(ON_PAVEMENTS)} "
+            "can be"
+        )
 
 
 def _recorded(output: Path, manner: Manner) -> dict[str, Any] | None:
