@@ -45,19 +45,14 @@ def starting_areas(network: Network, roads: Roads, ego_path: Path) -> tuple[Star
 
     Raises NetworkError when the network has no pavements, or none of them lies near enough.
     """
-    pavements = list(network.pavements())
-    if not pavements:
+    if next(network.pavements(), None) is None:
         raise NetworkError(
             f"{network.file}: has no pavements for pedestrians to start on; rebuild it with "
             "netconvert --sidewalks.guess --crossings.guess"
         )
     line = LineString(ego_path.points)
-    areas = [
-        area
-        for lane in pavements
-        if LineString(lane_shape(lane)).distance(line) <= NEAR_M
-        for area in _stretches(lane, roads, line)
-    ]
+    near = network.pavements_near(line, NEAR_M)
+    areas = [area for lane in near for area in _stretches(lane, roads, line)]
     if not areas:
         raise NetworkError(
             f"{network.file}: no pavement lies beside the ego's route; choose another with "
