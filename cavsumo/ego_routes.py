@@ -55,11 +55,9 @@ def derived_routes(network: Network, junction_id: str | None, half_m: float) -> 
     A network without a junction to drive through gives its longest edge with a pavement.
     """
     none = True
-    for movement in ranked_movements(network, junction_id):
-        route = route_through(network, movement, half_m)
-        if route is not None:
-            none = False
-            yield route
+    for _, route in ranked_routes(network, junction_id, half_m):
+        none = False
+        yield route
     if none and junction_id:
         raise NetworkError(f"{network.file}: no car can drive through junction {junction_id!r}")
     if none:
@@ -67,12 +65,30 @@ def derived_routes(network: Network, junction_id: str | None, half_m: float) -> 
         yield _routed(network, [edge], half_m, half_m, float(edge.getLength()), None)
 
 
+def ranked_routes(
+    network: Network, junction_id: str | None, half_m: float
+) -> Iterator[tuple[Movement, EgoRoute]]:
+    """The ways through a junction, or through all, with their routes, the best first.
+
+    Where roads are drawn over each other, netconvert makes lanes that lead back to the mouth of
+    the next one; routes along such a zigzag come last.
+    """
+    zigzags: list[tuple[Movement, EgoRoute]] = []
+    for movement in ranked_movements(network, junction_id):
+        route = route_through(network, movement, half_m)
+        if route is not None and _turns_back(route.path):
+            zigzags.append((movement, route))
+        elif route is not None:
+            yield movement, route
+    yield from zigzags
+
+
 def ranked_movements(network: Network, junction_id: str | None = None) -> list[Movement]:
     """The ways through a junction, or through all: those over crossings, straight on and well
     approached first, ties by id; U-turns are left out."""
     nodes = [network.junction(junction_id)] if junction_id else network.net.getNodes()
     crossed = network.crossed_edges()
-    found = (m for node in nodes for m in movements(node) if m.direction not in BACK)
+    found = (m for node in nodes for m in movements(node) if not m.turns_back)
     return sorted(found, key=lambda m: _worth(m, crossed))
 
 
@@ -94,12 +110,17 @@ class Movement:
     lanes: tuple[Any, Any]
 
     @property
+    def turns_back(self) -> bool:
+        """Whether it is a U-turn."""
+        return self.direction in BACK
+
+    @property
     def turn(self) -> str:
         """Which way it goes, by its geometry: straight is within 45 degrees of straight on.
 
         U-turns are SUMO's, because a road may return beside itself by any angle.
         """
-        if self.direction in BACK:
+        if self.turns_back:
             return "u-turn"
         before, after = (lane_path([lane]) for lane in self.lanes)
         a = before.at(before.length)[:2], before.at(max(0.0, before.length - HEADING_M))[:2]
@@ -203,6 +224,12 @@ def route_through(network: Network, movement: Movement, half_m: float) -> EgoRou
         return _routed(network, edges, half_m, depart, arrive, str(movement.node.getID()))
     except NetworkError:
         return None
+
+
+def _turns_back(path: Path) -> bool:
+    """Whether a path has a corner in which it goes back."""
+    legs = [(q[0] - p[0], q[1] - p[1]) for p, q in pairwise(path.points)]
+    return any(a[0] * b[0] + a[1] * b[1] < 0.0 for a, b in pairwise(legs))
 
 
 def _driven(network: Network, edges: Sequence[Any]) -> float:

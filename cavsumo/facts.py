@@ -26,8 +26,8 @@ class Facts:
         edges, lanes, car_lanes, pavements: roads by direction, and lanes of them by use.
         junctions, dead_ends: nodes that connect roads, and those that end one.
         traffic_lights: number of signal controllers.
-        crossings: number of pedestrian crossings, and of these
-        crossings_with_signals, crossings_with_priority, crossings_without_priority: by right of way.
+        crossings: number of pedestrian crossings.
+        crossings_with_signals, crossings_with_priority, crossings_without_priority: of these.
         walking_areas: where pavements and crossings meet.
         components: parts that no road connects.
         width_m, height_m: extent [m].

@@ -22,7 +22,8 @@ LEFT_CODES = frozenset(
 
 # Outlines as longitude,latitude in degrees; two points are opposite corners of a box.
 LEFT_AREAS = {
-    "Great Britain or Ireland": "-11,51 -6.5,49.7 -2.6,49.9 0.5,50.5 1.5,51 2,51.5 2,53 -0.3,61 -11,58",
+    "Great Britain or Ireland": "-11,51 -6.5,49.7 -2.6,49.9 0.5,50.5 1.5,51 2,51.5 2,53"
+    " -0.3,61 -11,58",
     "the Channel Islands": "-2.75,49.1 -1.95,49.8",
     "Malta": "14.1,35.7 14.6,36.1",
     "Cyprus": "32.2,34.5 34.7,35.75",
@@ -119,7 +120,7 @@ def _by_place(bounds: Box) -> tuple[bool, str]:
 
 
 def _within(points: list[tuple[float, float]], x: float, y: float) -> bool:
-    """Whether a point lies in a polygon: a ray to the east meets its sides an odd number of times."""
+    """Whether a ray from a point to the east leaves a polygon: the point lies in it."""
     inside = False
     for (x0, y0), (x1, y1) in zip(points, [*points[1:], points[0]], strict=True):
         if (y0 > y) != (y1 > y) and x < x0 + (y - y0) * (x1 - x0) / (y1 - y0):

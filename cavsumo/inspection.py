@@ -3,20 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import shapely
 from shapely.geometry import LineString
 
-from cavsumo.ego_routes import EgoRoute, Movement, movements, ranked_movements, route_through
+from cavsumo.ego_routes import EgoRoute, Movement, movements, ranked_routes, route_through
 from cavsumo.errors import NetworkError
 from cavsumo.facts import place
 from cavsumo.network import Network, is_normal, lane_shape
 from cavsumo.roads import Roads
-from cavsumo.starts import StartingArea, starting_areas
+from cavsumo.starts import StartingArea, WaysAcross, starting_areas
 
-TURNS = ("straight", "left", "right", "u-turn")
 ATTEMPTS = 50  # routes that are tried in search of the junctions that testers reach
 
 
@@ -80,6 +79,7 @@ class Ground:
         half_m: half the ego's length [m].
         crossings: ids of the pedestrian crossings, in the order of
         lines: the index of their axes.
+        ways: ways across the road that were found.
     """
 
     network: Network
@@ -87,6 +87,7 @@ class Ground:
     half_m: float
     crossings: tuple[str, ...]
     lines: shapely.STRtree
+    ways: WaysAcross = field(default_factory=dict)
 
 
 def ground(network: Network, half_m: float) -> Ground:
@@ -104,12 +105,11 @@ def best_junctions(here: Ground, top: int) -> list[Junction]:
     reached: dict[str, Any] = {}
     others: dict[str, Any] = {}
     tried = 0
-    for movement in ranked_movements(here.network):
+    for movement, route in ranked_routes(here.network, None, here.half_m):
         key = str(movement.node.getID())
         if len(reached) >= top or (tried >= ATTEMPTS and len(reached) + len(others) >= top):
             break
-        route = None if key in reached else route_through(here.network, movement, here.half_m)
-        if route is not None:
+        if key not in reached:
             tried += 1
             meets = tried <= ATTEMPTS and _areas(here, route)
             (reached if meets else others).setdefault(key, movement.node)
@@ -121,8 +121,11 @@ def junction(here: Ground, node: Any) -> Junction:
     """A junction with all ways through it; those where testers meet the ego come first."""
     network = here.network
     x, y = (float(value) for value in node.getCoord()[:2])
-    back = [movement for movement in movements(node) if movement.turn == TURNS[-1]]
-    ways = [_way(here, m) for m in [*ranked_movements(network, str(node.getID())), *back]]
+    ranked = list(ranked_routes(network, str(node.getID()), here.half_m))
+    for movement in movements(node):
+        route = route_through(network, movement, here.half_m) if movement.turns_back else None
+        ranked += [(movement, route)] if route is not None else []
+    ways = [_way(here, movement, route) for movement, route in ranked]
     return Junction(
         id=str(node.getID()),
         type=str(node.getType()),
@@ -131,15 +134,12 @@ def junction(here: Ground, node: Any) -> Junction:
         centre=place(network, x, y),
         streets=_streets([*node.getIncoming(), *node.getOutgoing()]),
         crossings=sum(crossing.getFromNode() is node for crossing in network.crossings()),
-        ways=tuple(sorted((way for way in ways if way is not None), key=lambda w: not w.areas)),
+        ways=tuple(sorted(ways, key=lambda way: not way.areas)),
     )
 
 
-def _way(here: Ground, movement: Movement) -> Way | None:
-    """A movement with its route and whom it meets; None when no lanes lead along it."""
-    route = route_through(here.network, movement, here.half_m)
-    if route is None:
-        return None
+def _way(here: Ground, movement: Movement, route: EgoRoute) -> Way:
+    """A movement with its route and whom it meets."""
     met = here.lines.query(LineString(route.path.points), "intersects").tolist()
     return Way(
         turn=movement.turn,
@@ -155,7 +155,7 @@ def _way(here: Ground, movement: Movement) -> Way | None:
 def _areas(here: Ground, route: EgoRoute) -> tuple[StartingArea, ...]:
     """Where testers start that meet a route, none where there is no pavement."""
     try:
-        return starting_areas(here.network, here.roads, route.path)
+        return starting_areas(here.network, here.roads, route.path, here.ways)
     except NetworkError:
         return ()
 

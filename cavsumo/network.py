@@ -125,7 +125,9 @@ def read_network(file: FilePath) -> Network:
             str(file), withInternal=True, withPedestrianConnections=True, withFoes=False, lxml=False
         )
     except (xml.sax.SAXParseException, EOFError, zlib.error) as error:
-        raise NetworkError(f"network {str(file)!r}: not well-formed XML: {_one_line(error)}") from error
+        raise NetworkError(
+            f"network {str(file)!r}: not well-formed XML: {_one_line(error)}"
+        ) from error
     except (xml.sax.SAXException, LookupError, ValueError, TypeError, AttributeError, OSError) as e:
         raise NetworkError(f"network {str(file)!r}: cannot be read: {_one_line(e)}") from e
     network = Network(file, net, root)

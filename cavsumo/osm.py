@@ -1,4 +1,4 @@
-"""OpenStreetMap extracts: the roads in them, read as XML or .pbf and written without mappers' names.
+"""OpenStreetMap extracts: their roads, read as XML or .pbf, written without mappers' names.
 
 Users' names and ids, changesets and dates are never copied: an item has its id, where it is, its
 tags and what it is made of.
@@ -115,7 +115,9 @@ def find_roads(file: Path, box: Box | None) -> Roads:
 
 def write_roads(file: Path, roads: Roads, target: TextIO) -> None:
     """Write the roads found in an extract as OSM XML, with whole turn restrictions."""
-    target.write('<?xml version="1.0" encoding="UTF-8"?>\n<osm version="0.6" generator="cavsumo">\n')
+    target.write(
+        '<?xml version="1.0" encoding="UTF-8"?>\n<osm version="0.6" generator="cavsumo">\n'
+    )
     for item in read_items(file):
         if _is_kept(item, roads):
             target.writelines(_xml(item))
@@ -180,7 +182,8 @@ def _from_xml(element: ElementTree.Element) -> Item:
         refs = tuple(int(nd.attrib["ref"]) for nd in element.findall("nd"))
         return Item(kind, number, tags, refs=refs)
     members = tuple(
-        (m.attrib["type"], int(m.attrib["ref"]), m.get("role", "")) for m in element.findall("member")
+        (m.attrib["type"], int(m.attrib["ref"]), m.get("role", ""))
+        for m in element.findall("member")
     )
     return Item(kind, number, tags, members=members)
 
@@ -252,6 +255,10 @@ def _off_the_data(box: Box | None, bounds: Box | None) -> str:
         return "none of its roads has a node in it: the extract is incomplete"
     reach = ",".join(f"{x:.4f}" for x in bounds)
     turned = (box[1], box[0], box[3], box[2])
-    swapped = all(low <= x <= high for low, x, high in zip(bounds[:2] * 2, turned, bounds[2:] * 2, strict=True))
+    swapped = all(
+        low <= x <= high
+        for low, x, high in zip(bounds[:2] * 2, turned, bounds[2:] * 2, strict=True)
+    )
     hint = "; are latitude and longitude swapped?" if swapped else ""
-    return f"no road touches the box {','.join(f'{x:g}' for x in box)}; the data is within {reach}{hint}"
+    asked = ",".join(f"{x:g}" for x in box)
+    return f"no road touches the box {asked}; the data is within {reach}{hint}"

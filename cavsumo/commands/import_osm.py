@@ -12,8 +12,8 @@ from pathlib import Path
 
 from cavsumo import __version__
 from cavsumo.errors import Exit, InputError
-from cavsumo.handedness import warning
 from cavsumo.facts import Facts, facts
+from cavsumo.handedness import warning
 from cavsumo.netconvert import (
     ODBL,
     OSM_OPTIONS,
@@ -29,7 +29,12 @@ from cavsumo.netconvert import (
 from cavsumo.network import read_network
 from cavsumo.osm import Box, find_roads, parse_box, write_roads
 
-EXTRACT, NET, PATCH, ZEBRA_NET = "extract.osm.xml", "network.net.xml", "zebra.con.xml", "zebra.net.xml"
+EXTRACT, NET, PATCH, ZEBRA_NET = (
+    "extract.osm.xml",
+    "network.net.xml",
+    "zebra.con.xml",
+    "zebra.net.xml",
+)
 ZEBRA_OPTIONS = (
     f"sumo-net-file={NET}",
     f"connection-files={PATCH}",
@@ -119,7 +124,11 @@ def _zebra(folder: Path, time_limit_s: float) -> list[str]:
     """Give the crossings without traffic lights priority; what netconvert says to it."""
     network = read_network(folder / NET)
     crossings = [
-        (str(edge.getFromNode().getID()), network.crossed_by(edge), float(edge.getLanes()[0].getWidth()))
+        (
+            str(edge.getFromNode().getID()),
+            network.crossed_by(edge),
+            float(edge.getLanes()[0].getWidth()),
+        )
         for edge in network.crossings()
         # A patch of a junction with traffic lights would make netconvert fail.
         if not str(edge.getFromNode().getType()).startswith("traffic_light")

@@ -76,7 +76,9 @@ def _drawing(picture: Path | None) -> Any:
     if picture is None:
         return None
     if picture.suffix.lower() not in (".png", ".svg", ".pdf"):
-        raise InputError(f"--picture {str(picture)!r}: expected a name ending in .png, .svg or .pdf")
+        raise InputError(
+            f"--picture {str(picture)!r}: expected a name ending in .png, .svg or .pdf"
+        )
     if not picture.parent.is_dir():
         raise InputError(f"--picture {str(picture)!r}: no such folder {str(picture.parent)!r}")
     try:
