@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from importlib.util import find_spec
 from typing import Any
@@ -24,7 +24,7 @@ class Facts:
         format: version of SUMO's network format.
         left_hand: whether traffic keeps left.
         edges, lanes, car_lanes, pavements: roads by direction, and lanes of them by use.
-        junctions, dead_ends: nodes that connect roads, and those that end one.
+        junctions, dead_ends: nodes that connect roads, and those at which one ends.
         traffic_lights: number of signal controllers.
         crossings: number of pedestrian crossings.
         crossings_with_signals, crossings_with_priority, crossings_without_priority: of these.
@@ -59,8 +59,8 @@ class Facts:
 def facts(network: Network) -> Facts:
     """A network in figures."""
     lanes = [lane for edge in network.edges for lane in edge.getLanes()]
-    nodes = Counter(str(node.getType()) for node in network.net.getNodes())
-    dead_ends = nodes["dead_end"]
+    neighbours = _neighbours(network)
+    ends = sum(len(others) < 2 for others in neighbours.values())
     rights = Counter(right_of_way(crossing) for crossing in network.crossings())
     west, south, east, north = network.net.getBoundary()
     found = Facts(
@@ -70,15 +70,15 @@ def facts(network: Network) -> Facts:
         lanes=len(lanes),
         car_lanes=sum(len(driving_lanes(edge)) for edge in network.edges),
         pavements=sum(is_pavement(lane) for lane in lanes),
-        junctions=nodes.total() - nodes["internal"] - dead_ends,
-        dead_ends=dead_ends,
+        junctions=len(neighbours) - ends,
+        dead_ends=ends,
         traffic_lights=len(network.net.getTrafficLights()),
         crossings=rights.total(),
         crossings_with_signals=rights[SIGNALS],
         crossings_with_priority=rights[PRIORITY],
         crossings_without_priority=rights[NONE],
         walking_areas=len(network.inside("walkingarea")),
-        components=_components(network),
+        components=_components(neighbours),
         width_m=round(east - west, 2),
         height_m=round(north - south, 2),
         centre=place(network, (west + east) / 2, (south + north) / 2),
@@ -111,20 +111,28 @@ def has_georeference(network: Network) -> bool:
     return str(network.net._location.get("projParameter", "!")) not in ("!", "-", "", ".")
 
 
-def _components(network: Network) -> int:
-    """The number of parts that no road connects, whatever its direction."""
-    parents: dict[str, str] = {}
-
-    def root(node: str) -> str:
-        parents.setdefault(node, node)
-        while parents[node] != node:
-            parents[node] = parents[parents[node]]
-            node = parents[node]
-        return node
-
+def _neighbours(network: Network) -> dict[str, set[str]]:
+    """The junctions that roads connect with each junction, whatever their direction."""
+    found: dict[str, set[str]] = {}
     for edge in network.edges:
-        parents[root(str(edge.getFromNode().getID()))] = root(str(edge.getToNode().getID()))
-    return len({root(node) for node in parents})
+        a, b = str(edge.getFromNode().getID()), str(edge.getToNode().getID())
+        found.setdefault(a, set()).add(b)
+        found.setdefault(b, set()).add(a)
+    return found
+
+
+def _components(neighbours: Mapping[str, set[str]]) -> int:
+    """The number of parts that no road connects."""
+    parts, seen = 0, set[str]()
+    for first in neighbours:
+        parts += first not in seen
+        waiting = [first]
+        while waiting:
+            node = waiting.pop()
+            if node not in seen:
+                seen.add(node)
+                waiting += neighbours[node]
+    return parts
 
 
 def _notes(network: Network, found: Facts) -> Iterator[str]:

@@ -12,7 +12,7 @@ from shapely.geometry import LineString
 from cavsumo.ego_routes import EgoRoute, Movement, movements, ranked_routes, route_through
 from cavsumo.errors import NetworkError
 from cavsumo.facts import place
-from cavsumo.network import Network, is_normal, lane_shape
+from cavsumo.network import Network, is_normal, lane_shape, street
 from cavsumo.roads import Roads
 from cavsumo.starts import StartingArea, WaysAcross, starting_areas
 
@@ -145,7 +145,7 @@ def _way(here: Ground, movement: Movement, route: EgoRoute) -> Way:
         turn=movement.turn,
         into=str(movement.into.getID()),
         out=str(movement.out.getID()),
-        streets=(str(movement.into.getName() or ""), str(movement.out.getName() or "")),
+        streets=(street(movement.into), street(movement.out)),
         route=route,
         crossings=tuple(here.crossings[i] for i in sorted(met)),
         areas=_areas(here, route),
@@ -162,4 +162,4 @@ def _areas(here: Ground, route: EgoRoute) -> tuple[StartingArea, ...]:
 
 def _streets(edges: Iterable[Any]) -> tuple[str, ...]:
     """The names of roads, each once, in order."""
-    return tuple(sorted({str(e.getName()) for e in edges if is_normal(e) and e.getName()}))
+    return tuple(sorted({street(e) for e in edges if is_normal(e) and e.getName()}))

@@ -17,7 +17,7 @@ from shapely.geometry import LineString, Polygon
 
 from cavsumo.facts import PRIORITY, SIGNALS, right_of_way
 from cavsumo.inspection import Ground, Way
-from cavsumo.network import is_pavement, lane_areas, lane_shape
+from cavsumo.network import is_pavement, lane_areas, lane_shape, street
 from cavsumo.paths import Path as Polyline
 
 Box = tuple[float, float, float, float]  # west, south, east, north [m]
@@ -81,7 +81,7 @@ def _draw_names(axes: Axes, here: Ground, window: shapely.Geometry) -> None:
     """Each street's name, where most of it is seen."""
     best: dict[str, LineString] = {}
     for edge in here.network.edges:
-        name, line = str(edge.getName() or ""), LineString(edge.getShape()).intersection(window)
+        name, line = street(edge), LineString(edge.getShape()).intersection(window)
         seen = line.geom_type == "LineString" and line.length > 3.0 * len(name)
         if (
             name

@@ -7,6 +7,7 @@ no side of the road is taken for granted.
 from __future__ import annotations
 
 import gzip
+import html
 import xml.sax
 import zlib
 from collections.abc import Iterator, Mapping, Sequence
@@ -134,6 +135,11 @@ def read_network(file: FilePath) -> Network:
     if not any(driving_lanes(edge) for edge in network.edges):
         raise NetworkError(f"network {str(file)!r}: holds no lane on which a car may drive")
     return network
+
+
+def street(edge: Any) -> str:
+    """The name of an edge's street, empty for none."""
+    return html.unescape(str(edge.getName() or ""))  # netconvert escapes what is escaped
 
 
 def is_normal(edge: Any) -> bool:
