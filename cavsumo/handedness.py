@@ -20,6 +20,8 @@ LEFT_CODES = frozenset(
     """.split()
 )
 
+BOTH_SIDES = ("CN", "US")  # parts of these keep left: Hong Kong, Macau, the Virgin Islands
+
 # Outlines as longitude,latitude in degrees; two points are opposite corners of a box.
 LEFT_AREAS = {
     "Great Britain or Ireland": "-11,51 -6.5,49.7 -2.6,49.9 0.5,50.5 1.5,51 2,51.5 2,53"
@@ -94,7 +96,7 @@ def _by_tags(hints: Mapping[tuple[str, str], int]) -> tuple[bool, str] | None:
     for (key, value), count in hints.items():
         if key == "driving_side" and value in ("left", "right"):
             sides[value] += count
-        elif key != "driving_side" and len(value) == 2 and value.isalpha():
+        elif key != "driving_side" and len(value) == 2 and value.upper() not in BOTH_SIDES:
             countries[value.upper()] += count
     if sides:
         side = max(sorted(sides), key=sides.__getitem__)

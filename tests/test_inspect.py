@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import importlib.util
 import json
+import os
 import subprocess
 import sys
 import time
@@ -180,6 +181,35 @@ def test_strange_ids_and_names_survive(
     assert main(["inspect", str(net), "--junction", "cluster_1_2_#3more[bold]"]) == 0
     out = capsys.readouterr().out
     assert "junction cluster_1_2_#3more[bold] (Yliopistonkatu, 花园[red]街)" in out
+
+
+@pytest.mark.parametrize("words", [[], ["--json"]])
+def test_a_narrow_terminal_encoding_is_no_error(
+    networks: dict[str, Path], tmp_path: Path, words: list[str]
+) -> None:
+    """Letters that stdout cannot write are escaped; JSON stays JSON."""
+    net = tmp_path / "odd.net.xml"
+    text = networks["pedestrians"].read_text(encoding="utf-8")
+    net.write_text(text.replace("eastbound", "东行"), encoding="utf-8")
+    done = subprocess.run(
+        [sys.executable, "-m", "cavsumo", "inspect", str(net), *words],
+        capture_output=True,
+        check=True,
+        env={**os.environ, "PYTHONIOENCODING": "ascii"},
+    )
+    assert done.stderr == b""
+    if words:
+        assert json.loads(done.stdout)["facts"]["edges"] == 2
+
+
+def test_without_pyproj_it_says_what_brings_it(
+    networks: dict[str, Path], capsys: Capture, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The centre is left out, everything else is there."""
+    monkeypatch.setattr("cavsumo.facts.find_spec", lambda name: None)
+    found = _looked(capsys, str(networks["crossing"]), "--top", "1")
+    assert found["facts"]["centre"] is None
+    assert any("pip install 'cavsumo[osm]' brings pyproj" in n for n in found["facts"]["notes"])
 
 
 # A picture

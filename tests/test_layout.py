@@ -29,7 +29,7 @@ ORDER = """
     statistics tally stopping results recorder learning progress session
     summary interrupts replays listings
     commands commands.run commands.replay commands.merge commands.inspect commands.import_osm
-    cli __main__
+    cli_networks cli __main__
 """.split()
 
 HEAVY = {"numpy", "pandas", "scipy", "shapely", "libsumo", "sumolib", "pydantic", "rich"}

@@ -345,6 +345,8 @@ def test_tags_tell_the_side_before_coordinates_do() -> None:
     assert warning({("traffic_sign", "DE"): 2, ("addr:country", "GB"): 1}, bristol, False) is None
     tagged = {("driving_side", "left"): 1, ("addr:country", "DE"): 9}
     assert "driving_side=left" in (warning(tagged, berlin, False) or "")
+    hong_kong = (114.1, 22.3, 114.2, 22.4)  # tagged as China now and then
+    assert warning({("addr:country", "CN"): 3}, hong_kong, True) is None
     assert "without --left-hand" in (warning({}, berlin, True) or "")
 
 

@@ -88,7 +88,9 @@ def import_osm(order: Order) -> int:
         made = facts(read_network(folder / NET))
     log = _log_file(order.output)
     _publish(order, network, "".join(f"{line}\n" for line in said), log)
-    for line in [*([f"warning: {about}"] if about else []), *warning_summary(said, log)]:
+    remarks = [f"warning: {about}"] if about else []
+    remarks += [f"note: {note}" for note in made.notes]
+    for line in [*remarks, *warning_summary(said, log)]:
         print(line if line.startswith(" ") else f"cavsumo: {line}", file=sys.stderr)
     print(_what_was_made(order.output, made))
     return Exit.OK

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import dataclasses
+import io
 import json
 import shlex
+import sys
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -58,9 +60,9 @@ def inspect(look: Look) -> int:
     if draw is not None:
         draw(here, junctions[0] if junctions else None, look.picture)
     if look.as_json:
-        print(json.dumps(as_json(look.net, found, junctions), ensure_ascii=False, indent=2))
+        print(json.dumps(as_json(look.net, found, junctions), ensure_ascii=not _utf8(), indent=2))
     else:
-        _show(look, found, junctions)
+        _print(_shown(look, found, junctions))
     return Exit.OK
 
 
@@ -142,22 +144,34 @@ def _area_json(area: StartingArea) -> dict[str, Any]:
 # Table
 
 
-def _show(look: Look, found: Facts, junctions: list[Junction]) -> None:
-    """Print facts and junctions on stdout."""
-    console = Console(width=WIDTH)
+def _utf8() -> bool:
+    """Whether stdout can write every letter."""
+    return (sys.stdout.encoding or "").lower().replace("-", "") == "utf8"
+
+
+def _print(text: str) -> None:
+    """Print on stdout, whatever letters it can write."""
+    encoding = sys.stdout.encoding or "utf-8"
+    print(text.encode(encoding, "backslashreplace").decode(encoding), end="")
+
+
+def _shown(look: Look, found: Facts, junctions: list[Junction]) -> str:
+    """Facts and junctions as a text."""
+    text = io.StringIO()
+    console = Console(width=WIDTH, file=text)
     console.print(_facts_table(look.net, found))
     for rank, j in enumerate(junctions, 1):
         _say(console, f"\n{_heading(rank, j)}")
         console.print(_ways_table(j.ways))
     if not junctions:
         _say(console, "\nno junction to drive through: the ego follows the longest road")
-        return
     asked = "" if look.junction is None else f" --junction {shlex.quote(junctions[0].id)}"
     _say(
         console,
         "\nstarting areas: pavements from which the way across the road meets the ego's path"
         f"\n       cavsumo run --net {shlex.quote(str(look.net))}{asked}",
     )
+    return text.getvalue()
 
 
 def _say(console: Console, text: str) -> None:
