@@ -8,10 +8,9 @@ from __future__ import annotations
 
 import bz2
 import gzip
-import math
 import zlib
 from collections import Counter
-from collections.abc import Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, TextIO
@@ -87,40 +86,60 @@ def parse_box(text: str) -> Box:
 
 def find_roads(file: Path, box: Box | None) -> Roads:
     """The roads of an extract, whole, that touch the box; raises InputError when there are none."""
-    found, inside = Roads(), set[int]()
-    west, south, east, north = (math.inf, math.inf, -math.inf, -math.inf)
-    roads = near = 0
-    for item in read_items(file):  # Nodes come before ways in an extract.
+    found, places = Roads(), dict[int, tuple[float, float]]()
+    tracks: list[tuple[Item, bool]] = []  # ways, and whether they are roads
+    for item in read_items(file):  # in any order: Overpass may put ways before their nodes
         _note_hints(item, found.hints)
         if item.kind == "node":
-            lon, lat = float(item.lon), float(item.lat)
-            west, east = min(west, lon), max(east, lon)
-            south, north = min(south, lat), max(north, lat)
-            if box is None or (box[0] <= lon <= box[2] and box[1] <= lat <= box[3]):
-                inside.add(item.id)
+            places[item.id] = (float(item.lon), float(item.lat))
         elif item.kind == "way" and not TRACKS.isdisjoint(item.tags):
-            met = not inside.isdisjoint(item.refs)
-            if met:
-                found.ways.add(item.id)
-                found.nodes.update(item.refs)
-            roads += "highway" in item.tags
-            near += met and "highway" in item.tags
-    found.bounds = (west, south, east, north) if west <= east else None
-    if not roads:
+            tracks.append((item, "highway" in item.tags))
+    if not any(road for _, road in tracks):
         raise InputError(f"extract {str(file)!r}: holds no roads (no way has the tag highway)")
+    found.bounds = _bounds(places.values())
+    near = False
+    for way, road in tracks:
+        if any(_within(places.get(ref), box) for ref in way.refs):
+            found.ways.add(way.id)
+            found.nodes.update(way.refs)
+            near = near or road
     if not near:
         raise InputError(f"extract {str(file)!r}: {_off_the_data(box, found.bounds)}")
     return found
 
 
+def _bounds(places: Collection[tuple[float, float]]) -> Box | None:
+    """West, south, east, north of places; None without any."""
+    if not places:
+        return None
+    lons, lats = zip(*places, strict=True)
+    return min(lons), min(lats), max(lons), max(lats)
+
+
+def _within(place: tuple[float, float] | None, box: Box | None) -> bool:
+    """Whether a place is known and lies in the box, if there is one."""
+    if place is None or box is None:
+        return place is not None
+    return box[0] <= place[0] <= box[2] and box[1] <= place[1] <= box[3]
+
+
 def write_roads(file: Path, roads: Roads, target: TextIO) -> None:
-    """Write the roads found in an extract as OSM XML, with whole turn restrictions."""
+    """Write the roads found in an extract as OSM XML, with whole turn restrictions.
+
+    Nodes come first, wherever they stand in the extract: netconvert finds no others.
+    """
+    behind: list[Item] = []
     target.write(
         '<?xml version="1.0" encoding="UTF-8"?>\n<osm version="0.6" generator="cavsumo">\n'
     )
     for item in read_items(file):
         if _is_kept(item, roads):
-            target.writelines(_xml(item))
+            if item.kind == "node":
+                target.writelines(_xml(item))
+            else:
+                behind.append(item)
+    for item in behind:
+        target.writelines(_xml(item))
     target.write("</osm>\n")
 
 

@@ -138,6 +138,19 @@ def test_a_box_keeps_whole_roads_that_touch_it(imported: Import) -> None:
 
 
 @needs_netconvert
+def test_ways_may_stand_before_their_nodes(imported: Import, tmp_path: Path) -> None:
+    """As Overpass writes them when asked for ways first: the same network."""
+    text = CROSSROADS.read_text(encoding="utf-8")
+    head, rest = text[: text.index("  <node")], text[text.index("  <node") :]
+    nodes, ways = rest[: rest.index("  <way")], rest[rest.index("  <way") :]
+    turned = tmp_path / "crossroads.osm"
+    turned.write_text(head + ways.replace("</osm>", "") + nodes + "</osm>", encoding="utf-8")
+    first = imported("--bbox", WEST_HALF)
+    again = imported("--bbox", WEST_HALF, source=turned, name="turned.net.xml")
+    assert again.read_bytes() == first.read_bytes()
+
+
+@needs_netconvert
 def test_zebras_give_priority_where_there_are_no_traffic_lights(imported: Import) -> None:
     """By default pedestrians yield; with --zebra they do not, and signals stay signals."""
     plain = facts(read_network(imported(name="plain.net.xml")))
