@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any, NoReturn
 
 from cavsumo import __version__
+from cavsumo.cli_networks import add_import_osm, add_inspect
 from cavsumo.errors import BatchError, CavsumoError, Exit, InputError
 
 # Settings that the command line takes over as they are.
@@ -18,12 +19,14 @@ PLAIN = (
     "embodiment sumo_width start_speed trace assertions "
     "reset shard first until_tests until_half_width until_rate"
 ).split()
+HYPHENATED = ("--bbox", "--ego-route", "--junction")  # options whose values may begin with "-"
 
 
 def main(argv: Sequence[str] | None = None) -> int:
     """The command ``cavsumo``; returns the exit status."""
     try:
-        options = _parser().parse_args(argv)
+        words = sys.argv[1:] if argv is None else argv
+        options = _parser().parse_args(_joined(words))
         status: int = options.command(options)
         return status
     except CavsumoError as error:
@@ -33,6 +36,21 @@ def main(argv: Sequence[str] | None = None) -> int:
         return Exit.OK
     except KeyboardInterrupt:
         return Exit.INTERRUPTED
+
+
+def _joined(words: Sequence[str]) -> list[str]:
+    """The words, with a value that begins with a hyphen tied to its option by "=".
+
+    Western longitudes and SUMO's edges against the direction begin with one, and argparse would
+    take them for options.
+    """
+    joined: list[str] = []
+    for word in words:
+        if joined and joined[-1] in HYPHENATED and word[:1] == "-" and word[:2] != "--":
+            joined[-1] += f"={word}"
+        else:
+            joined.append(word)
+    return joined
 
 
 class _Parser(argparse.ArgumentParser):
@@ -54,6 +72,8 @@ def _parser() -> argparse.ArgumentParser:
     _add_run(commands)
     _add_replay(commands)
     _add_merge(commands)
+    add_inspect(commands)
+    add_import_osm(commands)
     for sort, text in (
         ("agents", "list the tester agents"),
         ("egos", "list the vehicles under test"),
