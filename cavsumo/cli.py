@@ -18,12 +18,14 @@ PLAIN = (
     "embodiment sumo_width start_speed trace assertions "
     "reset shard first until_tests until_half_width until_rate"
 ).split()
+HYPHENATED = ("--bbox", "--ego-route", "--junction")  # options whose values may begin with "-"
 
 
 def main(argv: Sequence[str] | None = None) -> int:
     """The command ``cavsumo``; returns the exit status."""
     try:
-        options = _parser().parse_args(argv)
+        words = sys.argv[1:] if argv is None else argv
+        options = _parser().parse_args(_joined(words))
         status: int = options.command(options)
         return status
     except CavsumoError as error:
@@ -33,6 +35,21 @@ def main(argv: Sequence[str] | None = None) -> int:
         return Exit.OK
     except KeyboardInterrupt:
         return Exit.INTERRUPTED
+
+
+def _joined(words: Sequence[str]) -> list[str]:
+    """The words, with a value that begins with a hyphen tied to its option by "=".
+
+    Western longitudes and SUMO's edges against the direction begin with one, and argparse would
+    take them for options.
+    """
+    joined: list[str] = []
+    for word in words:
+        if joined and joined[-1] in HYPHENATED and word[:1] == "-" and word[:2] != "--":
+            joined[-1] += f"={word}"
+        else:
+            joined.append(word)
+    return joined
 
 
 class _Parser(argparse.ArgumentParser):
@@ -54,6 +71,8 @@ def _parser() -> argparse.ArgumentParser:
     _add_run(commands)
     _add_replay(commands)
     _add_merge(commands)
+    _add_inspect(commands)
+    _add_import_osm(commands)
     for sort, text in (
         ("agents", "list the tester agents"),
         ("egos", "list the vehicles under test"),
@@ -197,6 +216,54 @@ def _add_merge(commands: Any) -> None:
     merge.set_defaults(command=_merge)
 
 
+def _add_inspect(commands: Any) -> None:
+    inspect = commands.add_parser(
+        "inspect",
+        help="say what a network offers a test",
+        description="Say what a network offers a test: its figures, the junctions worth testing, "
+        "the ego's ways through them and where testers can meet it.",
+        allow_abbrev=False,
+    )
+    add = inspect.add_argument
+    add("net", type=Path, metavar="NET", help="SUMO network (.net.xml, .net.xml.gz)")
+    add("--junction", metavar="ID", help="look at this one (default: the best ones)")
+    add("--top", type=int, default=5, metavar="N", help="number of junctions (default 5)")
+    add("--json", dest="as_json", action="store_true", help="print JSON (docs/inspect.md)")
+    add("--picture", type=Path, metavar="FILE", help="draw the best junction (.png, .svg, .pdf)")
+    inspect.set_defaults(command=_inspect)
+
+
+def _add_import_osm(commands: Any) -> None:
+    osm = commands.add_parser(
+        "import-osm",
+        help="make a network from OpenStreetMap data",
+        description="Make a network from OpenStreetMap data with SUMO's netconvert; needs the "
+        "extra: pip install 'cavsumo[osm]'.",
+        allow_abbrev=False,
+    )
+    add = osm.add_argument
+    add("source", type=Path, metavar="FILE", help=".osm, .osm.xml, the same as .gz, or .pbf")
+    add("-o", "--output", required=True, type=Path, metavar="FILE", help="NAME.net.xml")
+    add("--bbox", metavar="W,S,E,N", help="only roads that touch this box, in degrees")
+    add("--left-hand", action="store_true", help="traffic keeps left")
+    add("--zebra", action="store_true", help="priority for pedestrians where there are no signals")
+    add(
+        "--keep-pedestrian-signals",
+        action="store_true",
+        help="keep signals away from junctions; they may be badly timed",
+    )
+    add("--overwrite", action="store_true", help="replace another network")
+    add(
+        "--time-limit",
+        dest="time_limit_s",
+        type=float,
+        default=600.0,
+        metavar="S",
+        help="for netconvert [s] (default 600)",
+    )
+    osm.set_defaults(command=_import_osm)
+
+
 def _run(options: argparse.Namespace) -> int:
     from cavsumo.commands.run import Manner, run
     from cavsumo.executors import Means
@@ -216,6 +283,19 @@ def _merge(options: argparse.Namespace) -> int:
     from cavsumo.commands.merge import merge
 
     return merge(options.parts, options.output, options.overwrite, options.quiet)
+
+
+def _inspect(options: argparse.Namespace) -> int:
+    from cavsumo.commands.inspect import Look, inspect
+
+    return inspect(Look(**{f.name: getattr(options, f.name) for f in dataclasses.fields(Look)}))
+
+
+def _import_osm(options: argparse.Namespace) -> int:
+    from cavsumo.commands.import_osm import Order, import_osm
+
+    values = {f.name: getattr(options, f.name) for f in dataclasses.fields(Order)}
+    return import_osm(Order(**values))
 
 
 def _list(options: argparse.Namespace) -> int:

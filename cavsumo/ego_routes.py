@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+import math
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 from typing import Any
@@ -13,6 +14,7 @@ from cavsumo.paths import Path
 
 APPROACH_M = 80.0  # how far before the junction the ego starts, where the roads allow it
 EXIT_M = 50.0  # how far behind the junction it is followed
+HEADING_M = 5.0  # stretch before and behind a junction that tells which way a movement turns
 STRAIGHT, BACK = "s", "tT"  # SUMO's connection directions
 YIELDING = "m=sw"  # SUMO's link states without right of way
 
@@ -47,52 +49,104 @@ def given_route(network: Network, edge_ids: Sequence[str], half_m: float) -> Ego
     return _routed(network, edges, half_m, half_m, float(edges[-1].getLength()), None)
 
 
-def derived_route(network: Network, junction_id: str | None, half_m: float) -> EgoRoute:
-    """The route best worth testing: over crossings, straight on, well approached; ties by id.
+def derived_routes(network: Network, junction_id: str | None, half_m: float) -> Iterator[EgoRoute]:
+    """The routes worth testing, the best first; raises NetworkError when there is none.
 
     A network without a junction to drive through gives its longest edge with a pavement.
     """
+    none = True
+    for _, route in ranked_routes(network, junction_id, half_m):
+        none = False
+        yield route
+    if none and junction_id:
+        raise NetworkError(f"{network.file}: no car can drive through junction {junction_id!r}")
+    if none:
+        edge = min(network.edges, key=_dullness)
+        yield _routed(network, [edge], half_m, half_m, float(edge.getLength()), None)
+
+
+def ranked_routes(
+    network: Network, junction_id: str | None, half_m: float
+) -> Iterator[tuple[Movement, EgoRoute]]:
+    """The ways through a junction, or through all, with their routes, the best first.
+
+    Where roads are drawn over each other, netconvert makes lanes that lead back to the mouth of
+    the next one; routes along such a zigzag come last.
+    """
+    zigzags: list[tuple[Movement, EgoRoute]] = []
+    for movement in ranked_movements(network, junction_id):
+        route = route_through(network, movement, half_m)
+        if route is not None and _turns_back(route.path):
+            zigzags.append((movement, route))
+        elif route is not None:
+            yield movement, route
+    yield from zigzags
+
+
+def ranked_movements(network: Network, junction_id: str | None = None) -> list[Movement]:
+    """The ways through a junction, or through all: those over crossings, straight on and well
+    approached first, ties by id; U-turns are left out."""
     nodes = [network.junction(junction_id)] if junction_id else network.net.getNodes()
     crossed = network.crossed_edges()
-    ranked = sorted(
-        (m for node in nodes for m in _movements(node)), key=lambda m: _worth(m, crossed)
-    )
-    for movement in ranked:
-        try:
-            return _through(network, movement, half_m)
-        except NetworkError:
-            continue  # no chain of lanes along these edges: the next best
-    if junction_id:
-        raise NetworkError(f"{network.file}: no car can drive through junction {junction_id!r}")
-    edge = min(network.edges, key=_dullness)
-    return _routed(network, [edge], half_m, half_m, float(edge.getLength()), None)
+    found = (m for node in nodes for m in movements(node) if not m.turns_back)
+    return sorted(found, key=lambda m: _worth(m, crossed))
 
 
 @dataclass(frozen=True)
-class _Movement:
-    """One way through a junction."""
+class Movement:
+    """One way through a junction.
+
+    Attributes:
+        into, out: the edges it leads from and to.
+        node: the junction.
+        direction: SUMO's letter for it.
+        lanes: the first pair of lanes that it connects.
+    """
 
     into: Any
     out: Any
     node: Any
     direction: str
+    lanes: tuple[Any, Any]
+
+    @property
+    def turns_back(self) -> bool:
+        """Whether it is a U-turn."""
+        return self.direction in BACK
+
+    @property
+    def turn(self) -> str:
+        """Which way it goes, by its geometry: straight is within 45 degrees of straight on.
+
+        U-turns are SUMO's, because a road may return beside itself by any angle.
+        """
+        if self.turns_back:
+            return "u-turn"
+        before, after = (lane_path([lane]) for lane in self.lanes)
+        a = before.at(before.length)[:2], before.at(max(0.0, before.length - HEADING_M))[:2]
+        b = after.at(min(after.length, HEADING_M))[:2], after.at(0.0)[:2]
+        came, goes = (math.atan2(p[1] - q[1], p[0] - q[0]) for p, q in (a, b))
+        angle = math.remainder(goes - came, 2 * math.pi)
+        if abs(angle) <= math.pi / 4:
+            return "straight"
+        return "left" if angle > 0 else "right"
 
 
-def _movements(node: Any) -> list[_Movement]:
-    """Each way a car may drive through a junction, once per pair of edges."""
-    found: dict[tuple[str, str], _Movement] = {}
-    for into in node.getIncoming():
+def movements(node: Any) -> list[Movement]:
+    """Each way a car may drive through a junction, once per pair of edges, U-turns included."""
+    found: dict[tuple[str, str], Movement] = {}
+    for into in filter(is_normal, node.getIncoming()):
         for lane in driving_lanes(into):
             for link in lane.getOutgoing():
-                out, direction = link.getTo(), str(link.getDirection())
-                if direction not in BACK and is_normal(into) and driving_lanes(out):
-                    found.setdefault(
-                        (into.getID(), out.getID()), _Movement(into, out, node, direction)
-                    )
+                out, target = link.getTo(), link.getToLane()
+                if target.allows("passenger") and is_normal(out):
+                    pair = (str(into.getID()), str(out.getID()))
+                    movement = Movement(into, out, node, str(link.getDirection()), (lane, target))
+                    found.setdefault(pair, movement)
     return list(found.values())
 
 
-def _worth(movement: _Movement, crossed: set[str]) -> tuple[Any, ...]:
+def _worth(movement: Movement, crossed: set[str]) -> tuple[Any, ...]:
     """Sort key: the best movement to test first."""
     into, out = movement.into, movement.out
     before = _upstream(into)
@@ -154,15 +208,28 @@ def _straight(connections: dict[Any, list[Any]]) -> list[Any]:
     ]
 
 
-def _through(network: Network, movement: _Movement, half_m: float) -> EgoRoute:
-    """The route through a junction, cut to the approach and the exit wanted."""
+def route_through(network: Network, movement: Movement, half_m: float) -> EgoRoute | None:
+    """The route through a junction, cut to the approach and the exit wanted.
+
+    None when no chain of lanes leads along its edges.
+    """
     before, after = _upstream(movement.into), _downstream(movement.out)
     while len(before) > 1 and _driven(network, before) - APPROACH_M >= before[0].getLength() - 1.0:
         before.pop(0)
     depart = max(half_m, _driven(network, before) - APPROACH_M)
     surplus = sum(e.getLength() for e in after) - EXIT_M
     arrive = max(1.0, float(after[-1].getLength()) - max(0.0, surplus))
-    return _routed(network, [*before, *after], half_m, depart, arrive, str(movement.node.getID()))
+    try:
+        edges = [*before, *after]
+        return _routed(network, edges, half_m, depart, arrive, str(movement.node.getID()))
+    except NetworkError:
+        return None
+
+
+def _turns_back(path: Path) -> bool:
+    """Whether a path has a corner in which it goes back."""
+    legs = [(q[0] - p[0], q[1] - p[1]) for p, q in pairwise(path.points)]
+    return any(a[0] * b[0] + a[1] * b[1] < 0.0 for a, b in pairwise(legs))
 
 
 def _driven(network: Network, edges: Sequence[Any]) -> float:

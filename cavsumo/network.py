@@ -7,8 +7,10 @@ no side of the road is taken for granted.
 from __future__ import annotations
 
 import gzip
+import html
 import xml.sax
-from collections.abc import Iterator, Sequence
+import zlib
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path as FilePath
 from typing import Any
 from xml.etree import ElementTree
@@ -32,16 +34,19 @@ class Network:
     Attributes:
         file: where it came from.
         net: the sumolib network.
+        root: the attributes of its <net>.
         edges: its normal edges, in the order of their ids.
     """
 
-    def __init__(self, file: FilePath, net: Any) -> None:
+    def __init__(self, file: FilePath, net: Any, root: Mapping[str, str]) -> None:
         self.file = file
         self.net = net
+        self.root = dict(root)
         self.edges: list[Any] = sorted(
             (e for e in net.getEdges() if is_normal(e)),
             key=lambda e: str(e.getID()),
         )
+        self._pavements: tuple[list[Any], shapely.STRtree] | None = None
 
     def edge(self, edge_id: str) -> Any:
         """The normal edge of that id; raises UnknownName with the nearest one."""
@@ -57,24 +62,32 @@ class Network:
             raise UnknownName("junction", junction_id, nodes, str(self.file))
         return nodes[junction_id]
 
+    @property
+    def left_hand(self) -> bool:
+        """Whether traffic keeps left."""
+        return self.root.get("lefthand") in ("true", "1")
+
+    def inside(self, function: str) -> list[Any]:
+        """The edges inside junctions with that function, in the order of the file."""
+        edges = self.net.getEdges(withInternal=True)
+        return [edge for edge in edges if edge.getFunction() == function]
+
+    def crossings(self) -> list[Any]:
+        """The pedestrian crossings, which are edges inside junctions."""
+        return self.inside("crossing")
+
+    def crossed_by(self, crossing: Any) -> list[str]:
+        """Ids of the edges that a crossing leads over."""
+        return [str(edge.getID()) for edge in crossing.getCrossingEdges()]
+
     def crossed_edges(self) -> set[str]:
         """Ids of the edges that a pedestrian crossing leads over."""
-        return {
-            str(crossed.getID())
-            for edge in self.net.getEdges(withInternal=True)
-            if edge.getFunction() == "crossing"
-            for crossed in edge.getCrossingEdges()
-        }
+        return {edge for crossing in self.crossings() for edge in self.crossed_by(crossing)}
 
     def crossing_surface(self) -> shapely.Geometry:
         """The surface of the marked pedestrian crossings."""
         return shapely.union_all(
-            [
-                _lane_area(lane)
-                for edge in self.net.getEdges(withInternal=True)
-                if edge.getFunction() == "crossing"
-                for lane in edge.getLanes()
-            ]
+            lane_areas([lane for edge in self.crossings() for lane in edge.getLanes()])
         )
 
     def pavements(self) -> Iterator[Any]:
@@ -82,16 +95,19 @@ class Network:
         for edge in self.edges:
             yield from (lane for lane in edge.getLanes() if is_pavement(lane))
 
+    def pavements_near(self, line: LineString, reach_m: float) -> list[Any]:
+        """The pavements within a distance of a line [m], in the order of their ids."""
+        if self._pavements is None:
+            lanes = list(self.pavements())
+            self._pavements = lanes, shapely.STRtree([LineString(lane_shape(p)) for p in lanes])
+        lanes, tree = self._pavements
+        return [lanes[i] for i in sorted(tree.query(line, "dwithin", reach_m).tolist())]
+
     def roads(self) -> Roads:
         """The carriageways, junctions included, and the axes of the driving lanes."""
         driving = [lane for edge in self.edges for lane in driving_lanes(edge)]
-        inside = [
-            lane
-            for edge in self.net.getEdges(withInternal=True)
-            if edge.getFunction() == "internal"
-            for lane in driving_lanes(edge)
-        ]
-        surface = shapely.union_all([_lane_area(lane) for lane in driving + inside])
+        inside = [lane for edge in self.inside("internal") for lane in driving_lanes(edge)]
+        surface = shapely.union_all(lane_areas(driving + inside))
         closed = surface.buffer(CLOSING_M, join_style="mitre").buffer(
             -CLOSING_M, join_style="mitre"
         )
@@ -104,15 +120,26 @@ def read_network(file: FilePath) -> Network:
         raise NetworkError(f"network {str(file)!r}: is a folder, expected a .net.xml")
     if not file.is_file():
         raise NetworkError(f"network {str(file)!r}: no such file{_neighbours(file)}")
-    _check_root(file)
+    root = _root(file)
     try:
-        net = sumolib.net.readNet(str(file), withInternal=True, withPedestrianConnections=True)
-    except (xml.sax.SAXException, KeyError, ValueError, TypeError, AttributeError, OSError) as e:
+        net = sumolib.net.readNet(
+            str(file), withInternal=True, withPedestrianConnections=True, withFoes=False, lxml=False
+        )
+    except (xml.sax.SAXParseException, EOFError, zlib.error) as error:
+        raise NetworkError(
+            f"network {str(file)!r}: not well-formed XML: {_one_line(error)}"
+        ) from error
+    except (xml.sax.SAXException, LookupError, ValueError, TypeError, AttributeError, OSError) as e:
         raise NetworkError(f"network {str(file)!r}: cannot be read: {_one_line(e)}") from e
-    network = Network(file, net)
+    network = Network(file, net, root)
     if not any(driving_lanes(edge) for edge in network.edges):
         raise NetworkError(f"network {str(file)!r}: holds no lane on which a car may drive")
     return network
+
+
+def street(edge: Any) -> str:
+    """The name of an edge's street, empty for none."""
+    return html.unescape(str(edge.getName() or ""))  # netconvert escapes what is escaped
 
 
 def is_normal(edge: Any) -> bool:
@@ -157,31 +184,33 @@ def lane_path(lanes: Sequence[Any]) -> Path:
     return Path(point for lane in lanes for point in lane_shape(lane))
 
 
-def _lane_area(lane: Any) -> shapely.Geometry:
-    """The surface of a lane; ValueError when it has none."""
-    if not float(lane.getWidth()) > 0.0:
-        raise ValueError(f"lane {lane.getID()!r} has the width {lane.getWidth()}")
-    return LineString(lane_shape(lane)).buffer(
-        float(lane.getWidth()) / 2, cap_style="flat", join_style="mitre"
-    )
+def lane_areas(lanes: Sequence[Any]) -> list[shapely.Geometry]:
+    """The surfaces of lanes, all at once for speed; ValueError when one has none."""
+    for lane in lanes:
+        if not float(lane.getWidth()) > 0.0:
+            raise ValueError(f"lane {lane.getID()!r} has the width {lane.getWidth()}")
+        if len(lane.getShape()) < 2:
+            raise ValueError(f"lane {lane.getID()!r} has a shape of fewer than two points")
+    if not lanes:
+        return []
+    axes = [LineString(lane_shape(lane)) for lane in lanes]
+    halves = [float(lane.getWidth()) / 2 for lane in lanes]
+    return list(shapely.buffer(axes, halves, cap_style="flat", join_style="mitre"))
 
 
-def _check_root(file: FilePath) -> None:
-    """Refuse what is not XML, or XML that is not a SUMO network, with the line."""
+def _root(file: FilePath) -> dict[str, str]:
+    """The attributes of a network's <net>; refuses what is not XML, or other XML."""
     opener = gzip.open if file.suffix == ".gz" else open
     try:
         with opener(file, "rb") as stream:
-            root = ""
-            for _, element in ElementTree.iterparse(stream, events=("start",)):
-                root = root or element.tag
-                if root != "net":
-                    break
-    except (ElementTree.ParseError, OSError, EOFError) as error:
+            _, root = next(ElementTree.iterparse(stream, events=("start",)))
+    except (ElementTree.ParseError, OSError, EOFError, zlib.error) as error:
         raise NetworkError(f"network {str(file)!r}: not well-formed XML: {error}") from error
-    if root != "net":
+    if root.tag != "net":
         raise NetworkError(
-            f"network {str(file)!r}: a SUMO network begins with <net>, this file with <{root}>"
+            f"network {str(file)!r}: a SUMO network begins with <net>, this file with <{root.tag}>"
         )
+    return dict(root.attrib)
 
 
 def _neighbours(file: FilePath) -> str:

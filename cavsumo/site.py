@@ -6,15 +6,18 @@ A plain picklable record, derived once by the parent and handed to the processes
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import islice
 from pathlib import Path
 
 import shapely
 
-from cavsumo.ego_routes import EgoRoute, derived_route, given_route
+from cavsumo.ego_routes import EgoRoute, derived_routes, given_route
 from cavsumo.errors import NetworkError
 from cavsumo.network import Network, read_network
 from cavsumo.roads import Roads
 from cavsumo.starts import StartingArea, starting_areas
+
+ATTEMPTS = 50  # routes that are tried before a network is refused
 
 
 @dataclass(frozen=True)
@@ -54,12 +57,28 @@ def _derived(
     network: Network, ego_route: tuple[str, ...], junction: str | None, ego_length: float
 ) -> Site:
     """The site of a network that was read."""
-    half = ego_length / 2
-    route = (
-        given_route(network, ego_route, half)
-        if ego_route
-        else derived_route(network, junction, half)
-    )
-    roads = network.roads()
-    areas = starting_areas(network, roads, route.path)
+    half, roads = ego_length / 2, network.roads()
+    if ego_route:
+        route = given_route(network, ego_route, half)
+        areas = starting_areas(network, roads, route.path)
+    else:
+        route, areas = best_route(network, roads, junction, half)
     return Site(network.file, route, roads, areas, network.crossing_surface())
+
+
+def best_route(
+    network: Network, roads: Roads, junction: str | None, half_m: float
+) -> tuple[EgoRoute, tuple[StartingArea, ...]]:
+    """The best-ranked route that testers can reach, and where they start.
+
+    ``half_m`` is half the ego's length. Raises the NetworkError of the first route when testers
+    reach none.
+    """
+    first: NetworkError | None = None
+    for route in islice(derived_routes(network, junction, half_m), ATTEMPTS):
+        try:
+            return route, starting_areas(network, roads, route.path)
+        except NetworkError as error:
+            first = first or error
+    assert first is not None
+    raise first

