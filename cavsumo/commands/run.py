@@ -155,6 +155,8 @@ def _first_line(setting: Setting, jobs: int) -> str:
     driver = f"{scenario.ego} ({attributes})" if attributes else scenario.ego
     where = f" junction {route.junction}" if route.junction else ""
     routes = scenario.routes.name if scenario.routes else "none"
+    if scenario.traffic is not None:
+        routes = "{:g},{:g} per minute and km".format(*scenario.traffic)
     shard = f", shard {plan.shard}" if plan.shard else ""
     at_a_time = f", {jobs} at a time" if jobs > 1 else ""
     return (
