@@ -11,7 +11,7 @@ from cavsumo.paths import Path
 from cavsumo.roads import Roads
 from cavsumo.starts import NEAR_M, StartingArea, stretches, ways_across
 
-STRIP_M = 2.0  # width of the strip along the carriageway on which they start
+STRIP_M = 2.5  # width of the strip along the carriageway on which they start; holds a bicycle
 LEAST_M = 1.0  # shorter pieces of it are left out
 ROUND_M = 0.05  # the outline is simplified by this much
 

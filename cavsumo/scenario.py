@@ -20,6 +20,7 @@ from pydantic import (
     field_validator,
 )
 
+from cavsumo.checks import densities
 from cavsumo.errors import InputError, UnknownName
 
 SHARED_BY = 25  # episodes that share one simulation when asked to
@@ -88,6 +89,12 @@ class Scenario(BaseModel):
     def _densities(cls, value: Any) -> Any:
         """One number for cars and pedestrians or two, as numbers or as text with a comma."""
         return None if value is None else densities(value)
+
+    @field_validator("ego_route", mode="before")
+    @classmethod
+    def _words(cls, value: Any) -> Any:
+        """Edges or a turn as text, as on the command line."""
+        return value.replace(",", " ").split() if isinstance(value, str) else value
 
     @property
     def name(self) -> str:
@@ -171,19 +178,6 @@ class BatchPlan(BaseModel):
         return mine | {
             k.removeprefix(prefix): v for k, v in self.params.items() if k.startswith(prefix)
         }
-
-
-def densities(value: Any) -> tuple[float, float]:
-    """Cars and pedestrians per minute and kilometre: ``4`` for both, ``4,2``, or two numbers."""
-    words = value.split(",") if isinstance(value, str) else value
-    words = words if isinstance(words, list | tuple) else [words]
-    try:
-        found = [math.nan if isinstance(word, bool) else float(word) for word in words]
-    except (TypeError, ValueError):
-        found = []
-    if len(found) not in (1, 2) or not all(0.0 <= number <= 100.0 for number in found):
-        raise ValueError("must be a number from 0 to 100, or two for cars and pedestrians")
-    return found[0], found[-1]
 
 
 def half_width(text: str) -> tuple[float, bool]:

@@ -5,6 +5,7 @@ Pure: the light's program and the ego's way come from the network; the world onl
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
@@ -15,7 +16,7 @@ from cavsumo.errors import NetworkError
 from cavsumo.network import Network
 
 Signal = Literal["any", "green", "red"]
-# SUMO's letters of a link; G goes before g, which gives way.
+# SUMO's letters of a link; G comes before g, which gives way.
 LETTERS = {"green": ("G", "g"), "red": ("r",)}
 PREPARED_S = 1.0  # the colour has been shown that long when the ego starts, if it lasts
 STANDING = 1.0  # m/s, egos that start more slowly are expected to speed up
@@ -78,8 +79,11 @@ def light_start(network: Network, route: EgoRoute, signal: Signal, pace: Pace) -
     approach = first_light(network, route, signal)
     program = _program(network, approach.light, signal)
     phases = [(float(phase.duration), str(phase.state)) for phase in program.getPhases()]
+    arrives = arrival(approach.legs, pace)
+    # Green as long before as it takes to be on when the ego starts; red in the middle.
+    lead = arrives + PREPARED_S if signal == "green" else math.inf
     for letter in LETTERS[signal]:
-        start = phase_at_start(phases, approach.link, letter, arrival(approach.legs, pace))
+        start = phase_at_start(phases, approach.link, letter, arrives, lead)
         if start is not None:
             return LightStart(approach.light, str(program._id), *start)
     raise NetworkError(
@@ -118,16 +122,17 @@ def arrival(legs: Sequence[tuple[float, float]], pace: Pace) -> float:
 
 
 def phase_at_start(
-    phases: Sequence[tuple[float, str]], link: int, letter: str, arrival_s: float
+    phases: Sequence[tuple[float, str]], link: int, letter: str, arrival_s: float, lead_s: float
 ) -> tuple[int, float] | None:
     """The phase at the start and what is left of it [s], so that the link shows a letter later.
 
-    The ego arrives in the longest run of phases that show it: when these have been on since before
-    it started, but at their middle at the latest. None when no phase shows the letter.
+    The ego arrives in the longest run of phases that show it, at their middle at the latest. None
+    when no phase shows the letter.
 
     Args:
         phases: durations [s] and states.
         arrival_s: when the ego arrives, from the start [s].
+        lead_s: how long the letter has been shown by then, if that is before the middle [s].
     """
     shown = [state[link : link + 1] == letter for _, state in phases]
     ends = [sum(duration for duration, _ in phases[: i + 1]) for i in range(len(phases))]
@@ -135,7 +140,7 @@ def phase_at_start(
     if not any(shown) or cycle <= 0.0:
         return None
     begin, length = _longest([duration for duration, _ in phases], shown)
-    moment = (begin + min(length / 2, arrival_s + PREPARED_S) - arrival_s) % cycle
+    moment = (begin + min(length / 2, lead_s) - arrival_s) % cycle
     phase = next((i for i, end in enumerate(ends) if moment < end - 5e-4), 0)
     return phase, round((ends[phase] - moment) % cycle or cycle, 3)
 
