@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import importlib.metadata
+import math
 import platform
 import sys
 from collections.abc import Iterator, Mapping
@@ -96,12 +97,19 @@ def prepare(plan: BatchPlan) -> Setting:
 def wishes(plan: BatchPlan, ego: Ego) -> Wishes:
     """What a plan asks of its site besides the route."""
     scenario = plan.scenario
-    top = ego.vtype().get("maxSpeed")
-    pace = Pace(ego.depart_speed, min(ego.kind.v_max, float(top) if top else ego.kind.v_max))
+    pace = Pace(ego.depart_speed, _top_speed(ego))
     volume = None
     if scenario.traffic is not None:
         volume = Volume(*scenario.traffic, duration=scenario.end + BEYOND_S, seed=plan.seed)
     return Wishes(scenario.jaywalk, volume, scenario.signal, pace)
+
+
+def _top_speed(ego: Ego) -> float:
+    """The speed that an ego never exceeds [m/s]; what is no number SUMO will refuse."""
+    try:
+        return min(ego.kind.v_max, float(ego.vtype().get("maxSpeed", math.inf)))
+    except ValueError:
+        return ego.kind.v_max
 
 
 def checksums(plan: BatchPlan) -> dict[str, str]:

@@ -185,7 +185,7 @@ def _middle(lane: Any) -> Point:
 
 
 def _parts(network: Network) -> dict[str, str]:
-    """For each edge that pedestrians may use, one that stands for all they can reach from it."""
+    """For each edge one that stands for all that pedestrians reach from it on their own lanes."""
     parent: dict[str, str] = {}
 
     def root(name: str) -> str:
@@ -196,8 +196,8 @@ def _parts(network: Network) -> dict[str, str]:
     for edge in network.net.getEdges(withInternal=True):
         name = root(str(edge.getID()))
         for lane in edge.getLanes():
-            for link in lane.getOutgoing() if lane.allows("pedestrian") else ():
-                if link.getToLane().allows("pedestrian"):
+            for link in lane.getOutgoing() if is_pavement(lane) else ():
+                if is_pavement(link.getToLane()):
                     parent[root(str(link.getTo().getID()))] = root(name)
     return {name: root(name) for name in sorted(parent)}
 
