@@ -34,3 +34,16 @@ def truth(name: str, value: Any) -> bool:
     if not isinstance(value, bool):
         raise ValueError(f"{name} must be true or false, got {value!r}")
     return value
+
+
+def densities(value: Any) -> tuple[float, float]:
+    """Cars and pedestrians per minute and kilometre: ``4`` for both, ``4,2``, or two numbers."""
+    words = value.split(",") if isinstance(value, str) else value
+    words = words if isinstance(words, list | tuple) else [words]
+    try:
+        found = [math.nan if isinstance(word, bool) else float(word) for word in words]
+    except (TypeError, ValueError):
+        found = []
+    if len(found) not in (1, 2) or not all(0.0 <= number <= 100.0 for number in found):
+        raise ValueError("must be a number from 0 to 100, or two for cars and pedestrians")
+    return found[0], found[-1]

@@ -15,8 +15,8 @@ from cavsumo.errors import BatchError, CavsumoError, Exit, InputError
 
 # Settings that the command line takes over as they are.
 PLAIN = (
-    "net routes ego junction agents runs seed end step_length testers kind bodies_per_agent "
-    "embodiment sumo_width start_speed trace assertions "
+    "net routes traffic ego junction signal agents runs seed end step_length testers kind jaywalk "
+    "bodies_per_agent embodiment sumo_width start_speed trace assertions "
     "reset shard first until_tests until_half_width until_rate"
 ).split()
 HYPHENATED = ("--bbox", "--ego-route", "--junction")  # options whose values may begin with "-"
@@ -162,14 +162,33 @@ def _add_scenario(group: Any) -> None:
         "--routes",
         "--route-files",
         metavar="FILE",
-        help="background demand, or none (default: routes/NAME.rou.xml when it exists)",
+        help="background demand, or none (default: routes/NAME.rou.xml when it exists and no "
+        "--traffic is given)",
+    )
+    add(
+        "--traffic",
+        metavar="DENSITY",
+        help="draw background traffic instead: departures per minute and kilometre, of cars (on "
+        "roads, each direction counted) and of pedestrians (on pavements); 4 for both, 4,2 for "
+        "each, none; not with --routes FILE",
     )
     add("-a", "--additional-files", metavar="FILES", help="SUMO additional files, with commas")
     add("-c", "--config", metavar="FILE", help="scenario file (TOML)")
     add("--ego", metavar="NAME", help="an ego by name (see cavsumo egos) or module:Class")
     add("--ego-param", action="append", metavar="KEY=VALUE", help="a parameter of the ego")
-    add("--ego-route", metavar="EDGES", help="edges of the ego's route, with commas or spaces")
+    add(
+        "--ego-route",
+        metavar="ROUTE",
+        help="edges of the ego's route, with commas or spaces; or straight, left, right, u-turn: "
+        "the best such way through the junction under test",
+    )
     add("--junction", metavar="ID", help="junction under test (default: the best one)")
+    add(
+        "--signal",
+        metavar="COLOUR",
+        help="what the ego meets at the first traffic light on its route when nothing hinders it: "
+        "green, red, or any (default any)",
+    )
     add("--assert", dest="assertions", action="append", metavar="NAME", help="repeat for several")
     add("--assert-param", action="append", metavar="KEY=VALUE", help="a parameter of theirs")
 
@@ -185,6 +204,12 @@ def _add_testers(group: Any) -> None:
         help="parameter of the agents that have it; AGENT.KEY=VALUE for one of them",
     )
     add("--kind", help="kind of body (default pedestrian)")
+    add(
+        "--jaywalk",
+        action=argparse.BooleanOptionalAction,
+        default=None,
+        help="start anywhere beside the road, also where there is no pavement",
+    )
     add("--bodies-per-agent", type=int, metavar="N", help="default 1")
     add("--embodiment", choices=("vehicle", "person"), help="what SUMO is shown")
     add("--sumo-width", type=float, metavar="M", help="width SUMO is shown (default 0.05)")

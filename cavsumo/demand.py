@@ -15,6 +15,7 @@ from xml.etree import ElementTree
 
 from cavsumo.errors import InputError
 
+BEYOND_S = 60.0  # how far beyond the horizon there must be demand, for waits and overtime
 WALKING = 2  # SUMO's number of the stage in which a person walks
 WAITING = 1  # and in which one waits
 # What a route file may hold besides departures.

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from itertools import pairwise
 from typing import Any
 
-from cavsumo.errors import NetworkError
+from cavsumo.errors import NetworkError, UnknownName
 from cavsumo.network import Network, driving_lanes, is_normal, is_pavement, lane_path
 from cavsumo.paths import Path
 
@@ -16,6 +16,7 @@ APPROACH_M = 80.0  # how far before the junction the ego starts, where the roads
 EXIT_M = 50.0  # how far behind the junction it is followed
 HEADING_M = 5.0  # stretch before and behind a junction that tells which way a movement turns
 STRAIGHT, BACK = "s", "tT"  # SUMO's connection directions
+TURNS = ("straight", "left", "right", "u-turn")
 YIELDING = "m=sw"  # SUMO's link states without right of way
 
 
@@ -63,6 +64,41 @@ def derived_routes(network: Network, junction_id: str | None, half_m: float) -> 
     if none:
         edge = min(network.edges, key=_dullness)
         yield _routed(network, [edge], half_m, half_m, float(edge.getLength()), None)
+
+
+def turn_meant(network: Network, words: Sequence[str]) -> str | None:
+    """The turn that an ego's route of one word means; None for edges, which go before turns."""
+    if len(words) != 1 or any(words[0] == e.getID() for e in network.edges):
+        return None
+    if words[0] not in TURNS:
+        valid = [*TURNS, *(str(e.getID()) for e in network.edges)]
+        raise UnknownName("edge or turn", words[0], valid, str(network.file))
+    return words[0]
+
+
+def turning_routes(
+    network: Network, junction_id: str | None, half_m: float, turn: str
+) -> Iterator[EgoRoute]:
+    """The routes that take a turn at a junction, the best first.
+
+    Raises NetworkError when there is none, with the turns that there are.
+    """
+    if junction_id is None:
+        raise NetworkError(f"{network.file}: has no junction with a way {turn!r} for the ego")
+    found: dict[str, list[EgoRoute]] = {}
+    crossed = network.crossed_edges()
+    ways = movements(network.junction(junction_id))
+    for movement in sorted(ways, key=lambda m: _worth(m, crossed)):
+        route = route_through(network, movement, half_m)
+        if route is not None:
+            found.setdefault(movement.turn, []).append(route)
+    if turn not in found:
+        known = ", ".join(t for t in TURNS if t in found) or "none"
+        raise NetworkError(
+            f"{network.file}: no way {turn!r} for the ego through junction {junction_id!r}; "
+            f"the ways there: {known}"
+        )
+    yield from found[turn]
 
 
 def ranked_routes(
@@ -234,7 +270,7 @@ def _turns_back(path: Path) -> bool:
 
 def _driven(network: Network, edges: Sequence[Any]) -> float:
     """Length of the way over some edges, junction interiors included [m]; 0 when there is none."""
-    lanes = _lanes_along(network, edges)
+    lanes = lanes_along(network, edges)
     return lane_path(lanes).length if lanes else 0.0
 
 
@@ -250,7 +286,7 @@ def _routed(
     for edge in edges:
         if not driving_lanes(edge):
             raise NetworkError(f"{network.file}: no car may drive on edge {edge.getID()!r}")
-    lanes = _lanes_along(network, edges)
+    lanes = lanes_along(network, edges)
     if lanes is None:
         names = " ".join(str(e.getID()) for e in edges)
         raise NetworkError(f"{network.file}: no car can follow the route {names}")
@@ -268,7 +304,7 @@ def _routed(
     )
 
 
-def _lanes_along(network: Network, edges: Sequence[Any]) -> list[Any] | None:
+def lanes_along(network: Network, edges: Sequence[Any]) -> list[Any] | None:
     """Lanes that follow each other along the edges, junction interiors included, or None."""
     for lane in driving_lanes(edges[0]):
         chain = _chain(network, lane, edges[1:])

@@ -123,7 +123,12 @@ def read_network(file: FilePath) -> Network:
     root = _root(file)
     try:
         net = sumolib.net.readNet(
-            str(file), withInternal=True, withPedestrianConnections=True, withFoes=False, lxml=False
+            str(file),
+            withInternal=True,
+            withPedestrianConnections=True,
+            withPrograms=True,
+            withFoes=False,
+            lxml=False,
         )
     except (xml.sax.SAXParseException, EOFError, zlib.error) as error:
         raise NetworkError(

@@ -21,6 +21,7 @@ from pydantic import (
     field_validator,
 )
 
+from cavsumo.checks import densities
 from cavsumo.errors import InputError, UnknownName
 
 SHARED_BY = 25  # episodes that share one simulation when asked to
@@ -37,13 +38,26 @@ class Scenario(BaseModel):
 
     net: Path = Field(description="SUMO network")
     routes: Path | None = Field(None, description="background demand; none for empty roads")
+    traffic: tuple[float, float] | None = Field(
+        None,
+        description="background cars and pedestrians drawn for the network: departures per minute "
+        "and kilometre of road, each direction counted, and of pavement; instead of routes",
+    )
     additional: tuple[Path, ...] = Field((), description="SUMO additional files")
     ego: str = Field("sumo", description="registered ego or module:Class")
     ego_params: Params = Field(default_factory=dict, description="parameters of the ego")
-    ego_route: tuple[str, ...] = Field((), description="edges of the ego's route")
+    ego_route: tuple[str, ...] = Field(
+        (), description="edges of the ego's route, or one word: straight, left, right or u-turn"
+    )
     junction: str | None = Field(None, description="junction under test")
+    signal: Literal["any", "green", "red"] = Field(
+        "any", description="what the ego meets at the first traffic light on its route"
+    )
     testers: int = Field(3, ge=1, le=100, description="number of tester bodies")
     kind: str = Field("pedestrian", description="kind of the tester bodies")
+    jaywalk: bool = Field(
+        False, description="testers start anywhere beside the road, not on pavements only"
+    )
     bodies_per_agent: int = Field(1, ge=1, description="bodies that one agent owns")
     start_speed: Finite | None = Field(
         None,
@@ -70,6 +84,18 @@ class Scenario(BaseModel):
         if not math.isclose(value * 1000, round(value * 1000), abs_tol=1e-6):
             raise ValueError("must be a whole number of milliseconds, as SUMO's clock")
         return round(value, 3)
+
+    @field_validator("traffic", mode="before")
+    @classmethod
+    def _densities(cls, value: Any) -> Any:
+        """One number for cars and pedestrians or two, as numbers or as text with a comma."""
+        return None if value is None else densities(value)
+
+    @field_validator("ego_route", mode="before")
+    @classmethod
+    def _words(cls, value: Any) -> Any:
+        """Edges or a turn as text, as on the command line."""
+        return value.replace(",", " ").split() if isinstance(value, str) else value
 
     @property
     def name(self) -> str:
@@ -189,13 +215,16 @@ def plan_from(settings: Mapping[str, Any], source: str) -> BatchPlan:
     """Validate flat settings (from a file, the command line or both) into a plan.
 
     A route file that lies beside the network (``routes/NAME.rou.xml`` next to its folder) is
-    found when none is named; ``routes = "none"`` keeps the roads empty.
+    found when none is named and no traffic is to be drawn; ``routes = "none"`` keeps the roads
+    empty.
     """
     _check_keys(settings, source)
     if "net" not in settings:
         raise InputError(f"{source}: no network given; name one with --net FILE")
     scenario = {k: v for k, v in settings.items() if k in SCENARIO_KEYS}
-    scenario["routes"] = _route_file(Path(scenario["net"]), scenario.get("routes"))
+    if str(scenario.get("traffic")) == "none":
+        del scenario["traffic"]
+    scenario["routes"] = _route_file(scenario, source)
     try:
         plan = BatchPlan(
             scenario=Scenario(**scenario),
@@ -226,10 +255,20 @@ def _check_keys(settings: Mapping[str, Any], source: str) -> None:
             raise UnknownName("key", key, SCENARIO_KEYS | PLAN_KEYS, source)
 
 
-def _route_file(net: Path, given: Any) -> Path | None:
-    """The route file named, the one belonging to the network, or None."""
-    if given is not None:
-        return None if str(given) == "none" else Path(given)
+def _route_file(scenario: Mapping[str, Any], source: str) -> Path | None:
+    """The route file named, the one belonging to the network, or None.
+
+    Traffic that is drawn takes the place of the one that would be found, not of one that is named.
+    """
+    given, drawn = scenario.get("routes"), scenario.get("traffic") is not None
+    if given is not None and str(given) != "none" and drawn:
+        raise InputError(
+            f"{source}: traffic comes from routes {str(given)!r} or is drawn with traffic "
+            f"{scenario['traffic']!r}, not both; routes none or traffic none leaves one"
+        )
+    if given is not None or drawn:
+        return None if given is None or str(given) == "none" else Path(given)
+    net = Path(scenario["net"])
     stem = net.name.removesuffix(".gz").removesuffix(".xml").removesuffix(".net")
     for folder in (net.parent.parent / "routes", net.parent):
         file = folder / f"{stem}.rou.xml"

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import importlib.metadata
+import math
 import platform
 import sys
 from collections.abc import Iterator, Mapping
@@ -13,13 +14,17 @@ from typing import Any
 
 from cavsumo import __version__
 from cavsumo.assertions import ASSERTIONS
-from cavsumo.bodies import kind_named
+from cavsumo.bodies import WALKING, kind_named
+from cavsumo.demand import BEYOND_S
 from cavsumo.egos import make_ego
+from cavsumo.egos.base import Ego
 from cavsumo.errors import InputError
 from cavsumo.jobs import check_agents, learners
 from cavsumo.options import OPTIONS
 from cavsumo.scenario import BatchPlan
-from cavsumo.site import Site, derive_site
+from cavsumo.signals import Pace
+from cavsumo.site import Site, Wishes, derive_site
+from cavsumo.traffic import Volume
 
 # Settings that say how much of a batch to play and not what its episodes are.
 EXTENT = frozenset(
@@ -63,7 +68,8 @@ def prepare(plan: BatchPlan) -> Setting:
     check_agents(plan)
     for name in scenario.assertions:
         ASSERTIONS.make(name, scenario.assertion_params)
-    kind_named(scenario.kind)
+    if kind_named(scenario.kind).name not in WALKING and scenario.jaywalk:
+        raise InputError(f"jaywalk: only {' and '.join(WALKING)} start beside the road")
     if learners(plan) and (plan.shard or plan.reset == "shared"):
         what = f"shard {plan.shard}" if plan.shard else "reset shared"
         raise InputError(
@@ -71,8 +77,30 @@ def prepare(plan: BatchPlan) -> Setting:
             "sequence; learn=false plays what was learned"
         )
     ego = make_ego(scenario.ego, scenario.ego_params)
-    site = derive_site(scenario.net, scenario.ego_route, scenario.junction, ego.kind.length)
+    site = derive_site(
+        scenario.net, scenario.ego_route, scenario.junction, ego.kind.length, wishes(plan, ego)
+    )
+    if scenario.embodiment == "person" and not all(area.walk for area in site.areas):
+        raise InputError("jaywalk: embodiment person needs a pavement near by, and there is none")
     return Setting(plan, site, str(Path.cwd()), checksums(plan), versions())
+
+
+def wishes(plan: BatchPlan, ego: Ego) -> Wishes:
+    """What a plan asks of its site besides the route."""
+    scenario = plan.scenario
+    pace = Pace(ego.depart_speed, _top_speed(ego))
+    volume = None
+    if scenario.traffic is not None:
+        volume = Volume(*scenario.traffic, duration=scenario.end + BEYOND_S, seed=plan.seed)
+    return Wishes(scenario.jaywalk, volume, scenario.signal, pace)
+
+
+def _top_speed(ego: Ego) -> float:
+    """The speed that an ego never exceeds [m/s]; what is no number SUMO will refuse."""
+    try:
+        return min(ego.kind.v_max, float(ego.vtype().get("maxSpeed", math.inf)))
+    except ValueError:
+        return ego.kind.v_max
 
 
 def checksums(plan: BatchPlan) -> dict[str, str]:
@@ -97,10 +125,17 @@ def manifest(setting: Setting) -> dict[str, Any]:
         "plan": setting.plan.model_dump(mode="json"),
         "ego_route": list(setting.site.route.edges),
         "junction": setting.site.route.junction,
-        "sha256": dict(setting.checksums),
+        "sha256": dict(setting.checksums) | _traffic_checksum(setting.site),
         "versions": dict(setting.versions),
         "sumo_options": dict(OPTIONS),
     }
+
+
+def _traffic_checksum(site: Site) -> dict[str, str]:
+    """The SHA-256 of the background traffic that was drawn, if any."""
+    if site.demand is None:
+        return {}
+    return {"traffic": hashlib.sha256(site.demand.encode()).hexdigest()}
 
 
 def differences(

@@ -56,7 +56,8 @@ def starting_areas(
     if next(network.pavements(), None) is None:
         raise NetworkError(
             f"{network.file}: has no pavements for pedestrians to start on; rebuild it with "
-            "netconvert --sidewalks.guess --crossings.guess"
+            "netconvert --sidewalks.guess --crossings.guess, or let them start beside the road "
+            "with --jaywalk"
         )
     line = LineString(ego_path.points)
     near = network.pavements_near(line, NEAR_M)
@@ -65,7 +66,7 @@ def starting_areas(
     if not areas:
         raise NetworkError(
             f"{network.file}: no pavement lies beside the ego's route; choose another with "
-            "--ego-route or --junction"
+            "--ego-route or --junction, or let testers start beside the road with --jaywalk"
         )
     return tuple(areas)
 
@@ -97,21 +98,30 @@ def _stretches(
     walk = pavement_walk(lane.getEdge())
     name = str(lane.getID())
     if name not in known:
-        known[name] = _ways_across(pavement, roads)
-    met = shapely.intersects(ego_line, known[name]).tolist()
+        known[name] = ways_across(pavement, roads)
+    return stretches(pavement, width, walk, shapely.intersects(ego_line, known[name]).tolist())
+
+
+def stretches(
+    pavement: Path, width: float, walk: tuple[str, ...], met: Sequence[bool]
+) -> list[StartingArea]:
+    """The runs of pieces of a pavement that lead across the ego's path, by what each of them does.
+
+    The pieces are of the same length.
+    """
     piece = pavement.length / len(met)
-    stretches: list[StartingArea] = []
+    found: list[StartingArea] = []
     begin: float | None = None
     for i, good in enumerate([*met, False]):
         if good and begin is None:
             begin = i * piece
         elif not good and begin is not None:
-            stretches.append(StartingArea(pavement, begin, i * piece, width, walk))
+            found.append(StartingArea(pavement, begin, i * piece, width, walk))
             begin = None
-    return stretches
+    return found
 
 
-def _ways_across(pavement: Path, roads: Roads) -> np.ndarray[Any, Any]:
+def ways_across(pavement: Path, roads: Roads) -> np.ndarray[Any, Any]:
     """The way across the road from each piece of a pavement, as lines, None where there is none."""
     count = max(1, round(pavement.length / PIECE_M))
     piece = pavement.length / count

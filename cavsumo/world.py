@@ -21,7 +21,7 @@ import shapely
 
 from cavsumo.background import Background, Roaming, roaming
 from cavsumo.bodies import PEDESTRIAN, Body
-from cavsumo.demand import Demand, Departures, Lights, cleared, noted, types_only
+from cavsumo.demand import BEYOND_S, Demand, Departures, Lights, cleared, noted, types_only
 from cavsumo.egos.base import Acceleration, Command, Drive, Ego
 from cavsumo.errors import NoSuchAction, SimulationError
 from cavsumo.kinematics import steering_for_turn, step_floats, wrap
@@ -34,8 +34,8 @@ from cavsumo.sumo_poses import from_sumo, front
 from cavsumo.sumo_types import type_file
 
 EGO = "ego"
-DEMAND_BEYOND_S = 60.0  # how far beyond the horizon demand is noted, for waits and overtime
 ENTRY_S = 30.0  # how long the ego may wait for room to enter the network
+PROMPT_S = 1.0  # an ego that waited longer has the traffic light set once more
 KEEP_EXACT = 2  # moveToXY: exactly there, on the network or off it
 KEEP_EXACT_ANY_LANE = 6  # the same for persons, on lanes for cars too
 # moveToXY looks for lanes within this distance only; SUMO's default of 100 m costs ten times as
@@ -62,6 +62,10 @@ class World:
         self._types = Path(self._folder.name) / "types.add.xml"
         self._kept = Path(self._folder.name) / "kept.add.xml"
         self._types.write_text(type_file(scenario, ego), encoding="utf-8")
+        self._routes = scenario.routes
+        if site.demand is not None:
+            self._routes = Path(self._folder.name) / "traffic.rou.xml"
+            self._routes.write_text(site.demand, encoding="utf-8")
         self._roaming: Roaming | None = None
         self._demand: Demand | None = None
         self._departures: Departures | None = None
@@ -146,6 +150,7 @@ class World:
         libsumo.close()
         if simulation == "own":
             libsumo.start(self._command(seed))
+            self._set_light()
         else:
             self._start_shared(seed)
         libsumo.route.add("cavsumo_ego", list(self.site.route.edges))
@@ -153,17 +158,32 @@ class World:
 
     def _start_shared(self, seed: int) -> None:
         """Start SUMO without the demand, which each episode then sends by itself."""
-        routes = self.scenario.routes
+        routes = self._routes
         if self._demand is None:
             self._demand = Demand()
             if routes is not None:
                 self._kept.write_text(types_only(routes), encoding="utf-8")
                 libsumo.start(self._command(1))
-                self._demand = noted(libsumo, self.scenario.end + DEMAND_BEYOND_S)
+                self._demand = noted(libsumo, self.scenario.end + BEYOND_S)
                 libsumo.close()
         libsumo.start(self._command(seed, shared=True))
+        self._set_light()
         self._lights = Lights(libsumo)
         self._departures = Departures(libsumo, self._demand, self.dt)
+
+    def _set_light(self) -> None:
+        """Have the first traffic light on the ego's route show what was asked for."""
+        start, lights = self.site.light, libsumo.trafficlight
+        if start is None:
+            return
+        program = lights.getProgram(start.light)
+        if program != start.program:
+            raise SimulationError(
+                f"signal: traffic light {start.light!r} runs program {program!r}, not the "
+                f"network's {start.program!r}"
+            )
+        lights.setPhase(start.light, start.phase)
+        lights.setPhaseDuration(start.light, start.left)
 
     def _advance(self) -> None:
         """One timestep of SUMO."""
@@ -177,8 +197,8 @@ class World:
         if shared and self._kept.exists():
             more.append(self._kept)
         files = ["-n", str(scenario.net), "-a", ",".join(str(f) for f in more)]
-        if scenario.routes is not None and not shared:
-            files += ["-r", str(scenario.routes)]
+        if self._routes is not None and not shared:
+            files += ["-r", str(self._routes)]
         options = [word for k, v in OPTIONS.items() for word in (f"--{k}", v)]
         return [
             "sumo",
@@ -231,10 +251,12 @@ class World:
 
     def _enter(self, states: Sequence[BodyState]) -> BodyState:
         """Step until the ego has entered; the testers wait meanwhile."""
-        for _ in range(max(2, round(ENTRY_S / self.dt))):
+        for waited in range(max(2, round(ENTRY_S / self.dt))):
             self._advance()
             ego = self._read_ego()
             if ego is not None:
+                if waited * self.dt > PROMPT_S:
+                    self._set_light()  # the light went on while the ego waited
                 for state in states:
                     if not self._is_person(state):
                         libsumo.vehicle.setSpeedMode(state.id, UNSAFE)

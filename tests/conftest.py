@@ -61,7 +61,9 @@ def staged(networks: dict[str, Path]) -> Callable[..., tuple[BatchPlan, Site]]:
             del chosen["routes"]
         plan = plan_from(chosen, "test")
         s = plan.scenario
-        key = (s.net, s.ego_route, s.junction, s.ego, repr(sorted(s.ego_params.items())))
+        ego = (s.ego, repr(sorted(s.ego_params.items())))
+        drawn = (s.traffic, plan.seed, s.end) if s.traffic else ()
+        key = (s.net, s.ego_route, s.junction, *ego, s.jaywalk, s.signal, *drawn)
         if key not in sites:
             sites[key] = prepare(plan).site
         return plan, sites[key]

@@ -18,7 +18,7 @@ PACKAGE = Path(cavsumo.__file__).parent
 ORDER = """
     cavsumo errors checks registry kinematics geometry paths bodies snapshot roads
     sumo_poses background
-    network ego_routes starts site scene
+    network ego_routes starts kerbs signals trips traffic site scene
     osm handedness netconvert facts inspection layers picture
     agents.base agents.walking agents.triggers agents.random agents.features
     agents.programmed agents.election agents.qlearning agents

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from cavsumo.bodies import WALKING
 from cavsumo.egos import make_ego
 from cavsumo.errors import CavsumoError, Exit, InputError, ResultsError
 from cavsumo.executors import Means, opened
@@ -21,8 +22,6 @@ from cavsumo.setting import Setting, differences, manifest, prepare
 from cavsumo.stopping import looks_at_rows
 from cavsumo.summary import summarise
 from cavsumo.worker import rehearse
-
-ON_PAVEMENTS = ("pedestrian", "bicycle")  # kinds of body that may start there
 
 
 @dataclass(frozen=True)
@@ -120,10 +119,9 @@ def _check_output(output: Path) -> None:
 
 def _check_kind(kind: str) -> None:
     """Refuse testers that could not start anywhere."""
-    if kind not in ON_PAVEMENTS:
+    if kind not in WALKING:
         raise InputError(
-            f"kind {kind!r}: testers start on pavements, where only {' and '.join(ON_PAVEMENTS)} "
-            "can be"
+            f"kind {kind!r}: testers start on pavements, where only {' and '.join(WALKING)} can be"
         )
 
 
@@ -167,6 +165,8 @@ def _first_line(setting: Setting, jobs: int) -> str:
     driver = f"{scenario.ego} ({attributes})" if attributes else scenario.ego
     where = f" junction {route.junction}" if route.junction else ""
     routes = scenario.routes.name if scenario.routes else "none"
+    if scenario.traffic is not None:
+        routes = "{:g},{:g} per minute and km".format(*scenario.traffic)
     shard = f", shard {plan.shard}" if plan.shard else ""
     at_a_time = f", {jobs} at a time" if jobs > 1 else ""
     return (
