@@ -21,17 +21,15 @@ import shapely
 
 from cavsumo.background import Background, Roaming, roaming
 from cavsumo.bodies import PEDESTRIAN, Body
-from cavsumo.demand import BEYOND_S, Demand, Departures, Lights, cleared, noted, types_only
 from cavsumo.egos.base import Acceleration, Command, Drive, Ego
 from cavsumo.errors import NoSuchAction, SimulationError
 from cavsumo.kinematics import steering_for_turn, step_floats, wrap
-from cavsumo.options import OPTIONS
 from cavsumo.roads import Start
 from cavsumo.scenario import Scenario, Simulation
+from cavsumo.simulations import Simulations
 from cavsumo.site import Site
 from cavsumo.snapshot import BodyState, Snapshot
 from cavsumo.sumo_poses import from_sumo, front
-from cavsumo.sumo_types import type_file
 
 EGO = "ego"
 ENTRY_S = 30.0  # how long the ego may wait for room to enter the network
@@ -48,6 +46,7 @@ class World:
     """One SUMO simulation at a time; a context manager.
 
     Attributes:
+        simulations: starts and advances SUMO.
         collisions: pairs that SUMO itself reported as colliding in this episode.
         teleports, emergency_stops: how many SUMO reported in this episode.
     """
@@ -58,17 +57,10 @@ class World:
         self.ego_body = Body(EGO, ego.kind)
         self._persons = scenario.embodiment == "person"
         self._folder = TemporaryDirectory(prefix="cavsumo-")
-        self._heard = (Path(self._folder.name) / "stderr.log").open("ab")
-        self._types = Path(self._folder.name) / "types.add.xml"
-        self._kept = Path(self._folder.name) / "kept.add.xml"
-        self._types.write_text(type_file(scenario, ego), encoding="utf-8")
-        self._routes = scenario.routes
-        if site.demand is not None:
-            self._routes = Path(self._folder.name) / "traffic.rou.xml"
-            self._routes.write_text(site.demand, encoding="utf-8")
+        folder = Path(self._folder.name)
+        self._heard = (folder / "stderr.log").open("ab")
+        self.simulations = Simulations(libsumo, scenario, site, ego, folder)
         self._roaming: Roaming | None = None
-        self._demand: Demand | None = None
-        self._departures: Departures | None = None
         shapely.prepare(site.crossings)
 
     def __enter__(self) -> World:
@@ -109,7 +101,7 @@ class World:
         self._told: dict[str, tuple[BodyState, tuple[float, float, float]]] = {}
         self._step, self._steering = 0, 0.0
         with self._listening():
-            self._begin(seed, simulation)
+            self.simulations.begin(seed, simulation)
             self._insert(states, starts)
             ego = self._enter(states)
         self._ego = ego
@@ -126,7 +118,7 @@ class World:
         try:
             self._place(states)
             self._command_ego(command)
-            self._advance()
+            self.simulations.advance()
             self._collect_events()
             ego = self._read_ego() if self._driven is None else self._driven
         except (libsumo.TraCIException, libsumo.FatalTraCIError) as error:
@@ -138,74 +130,6 @@ class World:
             self._steering = self._implied_steering(ego)
         self._ego = ego
         return self._snapshot(ego, states)
-
-    def _begin(self, seed: int, simulation: Simulation) -> None:
-        """Start SUMO, or put it back to how it was when it started."""
-        if simulation == "same" and self._departures is not None:
-            cleared(libsumo)
-            self._lights.restore()
-            self._departures.begin()
-            return
-        self._departures = None
-        libsumo.close()
-        if simulation == "own":
-            libsumo.start(self._command(seed))
-            self._set_light()
-        else:
-            self._start_shared(seed)
-        libsumo.route.add("cavsumo_ego", list(self.site.route.edges))
-        libsumo.route.add("cavsumo_tester", [self.site.route.edges[0]])
-
-    def _start_shared(self, seed: int) -> None:
-        """Start SUMO without the demand, which each episode then sends by itself."""
-        routes = self._routes
-        if self._demand is None:
-            self._demand = Demand()
-            if routes is not None:
-                self._kept.write_text(types_only(routes), encoding="utf-8")
-                libsumo.start(self._command(1))
-                self._demand = noted(libsumo, self.scenario.end + BEYOND_S)
-                libsumo.close()
-        libsumo.start(self._command(seed, shared=True))
-        self._set_light()
-        self._lights = Lights(libsumo)
-        self._departures = Departures(libsumo, self._demand, self.dt)
-
-    def _set_light(self) -> None:
-        """Have the first traffic light on the ego's route show what was asked for."""
-        start, lights = self.site.light, libsumo.trafficlight
-        if start is None:
-            return
-        program = lights.getProgram(start.light)
-        if program != start.program:
-            raise SimulationError(
-                f"signal: traffic light {start.light!r} runs program {program!r}, not the "
-                f"network's {start.program!r}"
-            )
-        lights.setPhase(start.light, start.phase)
-        lights.setPhaseDuration(start.light, start.left)
-
-    def _advance(self) -> None:
-        """One timestep of SUMO."""
-        if self._departures is not None:
-            self._departures.send()
-        libsumo.simulationStep()
-
-    def _command(self, seed: int, *, shared: bool = False) -> list[str]:
-        """The command line of SUMO; of the demand only its types when it is sent by us."""
-        scenario, more = self.scenario, [*self.scenario.additional, self._types]
-        if shared and self._kept.exists():
-            more.append(self._kept)
-        files = ["-n", str(scenario.net), "-a", ",".join(str(f) for f in more)]
-        if self._routes is not None and not shared:
-            files += ["-r", str(self._routes)]
-        options = [word for k, v in OPTIONS.items() for word in (f"--{k}", v)]
-        return [
-            "sumo",
-            *files,
-            *options,
-            *("--step-length", f"{self.dt:g}", "--seed", str(seed % 2**31)),
-        ]
 
     @contextmanager
     def _listening(self) -> Iterator[None]:
@@ -252,11 +176,11 @@ class World:
     def _enter(self, states: Sequence[BodyState]) -> BodyState:
         """Step until the ego has entered; the testers wait meanwhile."""
         for waited in range(max(2, round(ENTRY_S / self.dt))):
-            self._advance()
+            self.simulations.advance()
             ego = self._read_ego()
             if ego is not None:
                 if waited * self.dt > PROMPT_S:
-                    self._set_light()  # the light went on while the ego waited
+                    self.simulations.set_light()  # the light went on while the ego waited
                 for state in states:
                     if not self._is_person(state):
                         libsumo.vehicle.setSpeedMode(state.id, UNSAFE)
