@@ -14,8 +14,8 @@ from cavsumo.errors import BatchError, CavsumoError, Exit, InputError
 
 # Settings that the command line takes over as they are.
 PLAIN = (
-    "net routes ego junction agents runs seed end step_length testers kind bodies_per_agent "
-    "embodiment sumo_width start_speed trace assertions "
+    "net routes ego junction agents runs seed end step_length testers kind approaches "
+    "bodies_per_agent embodiment sumo_width start_speed trace assertions "
     "reset shard first until_tests until_half_width until_rate"
 ).split()
 
@@ -164,7 +164,14 @@ def _add_testers(group: Any) -> None:
         metavar="KEY=VALUE",
         help="parameter of the agents that have it; AGENT.KEY=VALUE for one of them",
     )
-    add("--kind", help="kind of body (default pedestrian)")
+    add("--kind", help="kind of body: pedestrian (default), car, bus or bicycle")
+    add(
+        "--approach",
+        dest="approaches",
+        action="append",
+        metavar="TYPE",
+        help="of vehicles: crossing, merging, following or adjacent; repeat for several",
+    )
     add("--bodies-per-agent", type=int, metavar="N", help="default 1")
     add("--embodiment", choices=("vehicle", "person"), help="what SUMO is shown")
     add("--sumo-width", type=float, metavar="M", help="width SUMO is shown (default 0.05)")

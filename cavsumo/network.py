@@ -106,7 +106,9 @@ def read_network(file: FilePath) -> Network:
         raise NetworkError(f"network {str(file)!r}: no such file{_neighbours(file)}")
     _check_root(file)
     try:
-        net = sumolib.net.readNet(str(file), withInternal=True, withPedestrianConnections=True)
+        net = sumolib.net.readNet(
+            str(file), withInternal=True, withPedestrianConnections=True, withPrograms=True
+        )
     except (xml.sax.SAXException, KeyError, ValueError, TypeError, AttributeError, OSError) as e:
         raise NetworkError(f"network {str(file)!r}: cannot be read: {_one_line(e)}") from e
     network = Network(file, net)
@@ -155,6 +157,17 @@ def lane_shape(lane: Any) -> list[Point]:
 def lane_path(lanes: Sequence[Any]) -> Path:
     """The centre line through lanes that follow each other."""
     return Path(point for lane in lanes for point in lane_shape(lane))
+
+
+def interior(network: Network, link: Any) -> list[Any]:
+    """The lanes inside a junction that a connection leads over."""
+    lanes: list[Any] = []
+    while link is not None and link.getViaLaneID():
+        via = network.net.getLane(link.getViaLaneID())
+        lanes.append(via)
+        onward = via.getOutgoing()
+        link = onward[0] if onward else None
+    return lanes
 
 
 def _lane_area(lane: Any) -> shapely.Geometry:

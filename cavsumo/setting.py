@@ -13,15 +13,14 @@ from typing import Any
 
 from cavsumo import __version__
 from cavsumo.assertions import ASSERTIONS
-from cavsumo.bodies import kind_named
+from cavsumo.bodies import WALKING, Kind, kind_named
 from cavsumo.egos import make_ego
 from cavsumo.errors import InputError
-from cavsumo.jobs import check_agents, learners
+from cavsumo.jobs import check_agents, learners, make_agents
 from cavsumo.options import OPTIONS
 from cavsumo.scenario import BatchPlan
 from cavsumo.site import Site, derive_site
 
-ON_PAVEMENTS = ("pedestrian", "bicycle")  # kinds of body that may start there
 # Settings that say how much of a batch to play and not what its episodes are.
 EXTENT = frozenset(
     {"runs", "deadline_s", "first", "until_tests", "until_half_width", "until_rate", "budget_s"}
@@ -64,11 +63,8 @@ def prepare(plan: BatchPlan) -> Setting:
     check_agents(plan)
     for name in scenario.assertions:
         ASSERTIONS.make(name, scenario.assertion_params)
-    if kind_named(scenario.kind).name not in ON_PAVEMENTS:
-        raise InputError(
-            f"kind {scenario.kind!r}: testers start on pavements, where only "
-            f"{' and '.join(ON_PAVEMENTS)} can be"
-        )
+    kind = kind_named(scenario.kind)
+    _check_kind(plan, kind)
     if learners(plan) and (plan.shard or plan.reset == "shared"):
         what = f"shard {plan.shard}" if plan.shard else "reset shared"
         raise InputError(
@@ -76,8 +72,24 @@ def prepare(plan: BatchPlan) -> Setting:
             "sequence; learn=false plays what was learned"
         )
     ego = make_ego(scenario.ego, scenario.ego_params)
-    site = derive_site(scenario.net, scenario.ego_route, scenario.junction, ego.kind.length)
+    site = derive_site(
+        scenario.net, scenario.ego_route, scenario.junction, ego.kind, kind, scenario.approaches
+    )
     return Setting(plan, site, str(Path.cwd()), checksums(plan), versions())
+
+
+def _check_kind(plan: BatchPlan, kind: Kind) -> None:
+    """Refuse what walkers or vehicles cannot do."""
+    if kind.name in WALKING:
+        if plan.scenario.approaches:
+            raise InputError(f"kind {kind.name!r}: only vehicles have approaches; name a --kind")
+        return
+    for name in plan.agents:
+        if not all(agent.drives for agent in make_agents(plan, name)):
+            raise InputError(
+                f"kind {kind.name!r}: agent {name} can only walk; choose another agent or kind "
+                f"{' or '.join(WALKING)}"
+            )
 
 
 def checksums(plan: BatchPlan) -> dict[str, str]:

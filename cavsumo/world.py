@@ -226,7 +226,7 @@ class World:
                 libsumo.person.appendWalkingStage(state.id, list(edges), 0.0)
             else:
                 kind = state.body.kind.name
-                libsumo.vehicle.add(state.id, "cavsumo_tester", typeID=f"cavsumo_{kind}")
+                libsumo.vehicle.add(state.id, _route_of(start), typeID=f"cavsumo_{kind}")
         self._place(states)
 
     def _enter(self, states: Sequence[BodyState]) -> BodyState:
@@ -335,3 +335,13 @@ class World:
             self.collisions.add((a, b))
         self.teleports += len(simulation.getStartingTeleportIDList())
         self.emergency_stops += len(simulation.getEmergencyStoppingVehiclesIDList())
+
+
+def _route_of(start: Start) -> str:
+    """The id of SUMO's route for a tester: its way, by which others see where it will go."""
+    if start.approach is None:
+        return "cavsumo_tester"
+    name = " ".join(("cavsumo", *start.approach.edges))
+    if name not in libsumo.route.getIDList():  # a shared simulation has it already
+        libsumo.route.add(name, list(start.approach.edges))
+    return name

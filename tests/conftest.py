@@ -60,7 +60,8 @@ def staged(networks: dict[str, Path]) -> Callable[..., tuple[BatchPlan, Site]]:
             del chosen["routes"]
         plan = plan_from(chosen, "test")
         s = plan.scenario
-        key = (s.net, s.ego_route, s.junction, s.ego, repr(sorted(s.ego_params.items())))
+        ego = repr(sorted(s.ego_params.items()))
+        key = (s.net, s.ego_route, s.junction, s.ego, ego, s.kind, s.approaches)
         if key not in sites:
             sites[key] = prepare(plan).site
         return plan, sites[key]

@@ -1,0 +1,245 @@
+"""What a programmed vehicle does: lawful until it is triggered, then its manoeuvre.
+
+Lawful: it follows its lanes, keeps its distance to everybody and waits where its way meets the
+ego's: for good, unless it is triggered. It takes its time to get there, so as to be still rolling
+when the ego comes. On the ego's lane and beside it, it keeps the speed with which it started.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping
+from typing import ClassVar
+
+from cavsumo.agents.driving import HASTE_MPS2, RUN_OUT_M, Course, stopping_from
+from cavsumo.agents.triggers import MARGIN, MAX_DECEL, REACTION_TIME, Trigger
+from cavsumo.bodies import NOOP, Action
+from cavsumo.fairness import drift
+from cavsumo.roads import Approach
+from cavsumo.scene import Scene
+from cavsumo.snapshot import BodyState, Snapshot
+
+MANOEUVRES = ("auto", "run", "brake", "cut-in")
+CREEPING_MPS = 2.0  # a lawful vehicle goes no slower than this to where it waits
+STANDS_S = 3.0  # one that braked drives on after this time
+NOTICE_S = 1.0  # an ego that follows is taken to notice a brake light after this time
+SIDEWAYS = 0.25  # speed sideways of a vehicle that cuts in, as a share of its speed
+CUT_IN_LOOK_M = 9.0  # how gently it changes lanes: the distance of the point pursued
+SLOWED = 0.7  # speed after cutting in, as a share of the one before
+ARRIVED_M = 0.3  # so near the axis of a lane one is on it
+FAR_M = 30.0  # a run that leads into the ego's lane has ended after this
+
+
+class Manoeuvre:
+    """One manoeuvre of one vehicle.
+
+    Attributes:
+        course: what the vehicle drives along, before or after.
+    """
+
+    types: ClassVar[tuple[str, ...]]  # of approach on which it is possible
+
+    def __init__(self, scene: Scene, approach: Approach, course: Course) -> None:
+        self.scene, self.approach, self.course = scene, approach, course
+
+    def possible(self, state: BodyState) -> bool:
+        """Whether it can still begin."""
+        return True
+
+    def begin(self, state: BodyState) -> None:
+        """Begin."""
+
+    def act(self, state: BodyState, others: Iterator[BodyState]) -> Action:
+        """The next action; ``others`` are all but the ego."""
+        raise NotImplementedError
+
+    def over(self, state: BodyState) -> bool:
+        """Whether it has ended, and the vehicle drives lawfully on."""
+        return False
+
+    def gap(self, snapshot: Snapshot, state: BodyState) -> float | None:
+        """Room that an ego which drives on has left on meeting a vehicle that begins now [m].
+
+        Measured as the stopping zones count vehicles (``fairness``). None when they will not meet.
+        """
+        raise NotImplementedError
+
+    def _front(self, snapshot: Snapshot) -> float:
+        return self.scene.ego_progress(snapshot) + self.scene.ego.kind.length / 2
+
+
+class Run(Manoeuvre):
+    """Drives on across or into the ego's way, whatever light or sign it has, and whoever comes."""
+
+    types = ("crossing", "merging")
+
+    def possible(self, state: BodyState) -> bool:
+        return self.course.place(state)[0] < self.approach.enter
+
+    def act(self, state: BodyState, others: Iterator[BodyState]) -> Action:
+        allowed = self.course.room(state, others)
+        return self.course.drive(state, allowed, gaining=HASTE_MPS2)
+
+    def over(self, state: BodyState) -> bool:
+        end = min(self.approach.leave, self.approach.enter + FAR_M)
+        return self.course.place(state)[0] > end
+
+    def gap(self, snapshot: Snapshot, state: BodyState) -> float | None:
+        if not self.possible(state):
+            return None
+        approach, path = self.approach, self.scene.ego_path
+        time, v = self.course.time_to(state, approach.enter)
+        turn = self.course.path.at(approach.enter)[2] - path.at(approach.ego_enter)[2]
+        way = snapshot.ego.v * (time + self.scene.dt)
+        still = drift(v * math.cos(turn), snapshot.ego.v, MAX_DECEL)
+        return approach.ego_enter - self._front(snapshot) - way + still
+
+
+class Brake(Manoeuvre):
+    """Brakes as hard as it can, and stands for a while."""
+
+    types = ("following",)
+    standing = 0.0  # for how long [s]
+
+    def act(self, state: BodyState, others: Iterator[BodyState]) -> Action:
+        if state.v <= 0.0:
+            self.standing += self.scene.dt
+        return Action(state.body.kind.throttle_min, self.course.steering(state))
+
+    def over(self, state: BodyState) -> bool:
+        return self.standing > STANDS_S
+
+    def gap(self, snapshot: Snapshot, state: BodyState) -> float | None:
+        rear = self.course.place(state)[0] - state.body.kind.length / 2
+        stands = rear + drift(state.v, snapshot.ego.v, MAX_DECEL)
+        return stands - self._front(snapshot) - snapshot.ego.v * NOTICE_S
+
+
+class CutIn(Manoeuvre):
+    """Changes into the ego's lane and slows down."""
+
+    types = ("adjacent",)
+
+    def begin(self, state: BodyState) -> None:
+        assert self.approach.into is not None
+        self.speed = SLOWED * state.v
+        kind = state.body.kind
+        self.course = Course(self.approach.into, kind, self.scene.dt, max(self.speed, 1.0))
+
+    def act(self, state: BodyState, others: Iterator[BodyState]) -> Action:
+        return self.course.drive(state, self.course.room(state, others), look=CUT_IN_LOOK_M)
+
+    def over(self, state: BodyState) -> bool:
+        return abs(self.course.place(state)[1]) < ARRIVED_M
+
+    def gap(self, snapshot: Snapshot, state: BodyState) -> float | None:
+        here = self.scene.ego_path.project(state.x, state.y)
+        kind = state.body.kind
+        if state.v <= 0.0 or not 0.0 < here.along < self.scene.ego_path.length:
+            return None
+        strips = (kind.width + self.scene.ego.kind.width) / 2
+        time = max(0.0, abs(here.lateral) - strips) / (SIDEWAYS * state.v)
+        rear = here.along - kind.length / 2 + drift(state.v, snapshot.ego.v, MAX_DECEL)
+        return rear - self._front(snapshot) + (state.v - snapshot.ego.v) * time
+
+
+KNOWN: Mapping[str, type[Manoeuvre]] = {"run": Run, "brake": Brake, "cut-in": CutIn}
+
+
+def manoeuvre_on(name: str, type_: str) -> type[Manoeuvre] | None:
+    """The manoeuvre of a name on a type of approach; "auto" is the one that is possible there."""
+    for known, manoeuvre in KNOWN.items():
+        if name in ("auto", known) and type_ in manoeuvre.types:
+            return manoeuvre
+    return None
+
+
+class Driver:
+    """The behaviour of a programmed vehicle (``behaviours.Behaviour``).
+
+    Args:
+        idle: "noop" does nothing until it is triggered; anything else drives lawfully.
+        name: one of MANOEUVRES. A vehicle on an approach on which that is impossible drives
+            lawfully throughout.
+    """
+
+    def __init__(self, scene: Scene, index: int, idle: str, name: str) -> None:
+        approach = scene.starts[index].approach
+        assert approach is not None
+        self.scene, self.approach, self._noop = scene, approach, idle == "noop"
+        kind = scene.bodies[index].kind
+        waits = math.isfinite(approach.wait)
+        top = approach.speed if waits else scene.starts[index].v or approach.speed
+        self.course = Course(approach.path, kind, scene.dt, top)
+        chosen = manoeuvre_on(name, approach.type)
+        self.manoeuvre = chosen(scene, approach, self.course) if chosen else None
+        self.active = self._begun = False
+
+    def idle(self, snapshot: Snapshot, state: BodyState) -> Action:
+        """Drive lawfully, or do nothing before it begins."""
+        if self._noop and not self._begun:
+            return NOOP
+        here, dt = self.course.place(state)[0], self.scene.dt
+        left = self.course.path.length + RUN_OUT_M - here - state.v * dt
+        allowed = self.course.room(state, everybody(snapshot, state))
+        if not self._begun and here < self.approach.enter:
+            left = min(left, self.approach.wait - here - state.v * dt)
+            allowed = min(allowed, self._unhurried(snapshot, here))
+        return self.course.drive(state, min(allowed, stopping_from(left, 0.0, dt)))
+
+    def _unhurried(self, snapshot: Snapshot, here: float) -> float:
+        """The speed that leads to the ego's way no sooner than the ego to it [m/s]."""
+        ego = snapshot.ego
+        way = self.approach.ego_enter - self.scene.ego_progress(snapshot) - ego.body.kind.length / 2
+        if way <= 0.0 or ego.v <= CREEPING_MPS:
+            return CREEPING_MPS
+        return max(CREEPING_MPS, (self.approach.enter - here) * ego.v / way)
+
+    def begin(self, state: BodyState) -> bool:
+        """Begin the manoeuvre; False when there is none, or it is too late, or it has been."""
+        if self.manoeuvre is None or self._begun or not self.manoeuvre.possible(state):
+            return False
+        self.manoeuvre.begin(state)
+        self.course = self.manoeuvre.course
+        self.active = self._begun = True
+        return True
+
+    def act(self, snapshot: Snapshot, state: BodyState) -> Action:
+        """The next action of the manoeuvre."""
+        assert self.manoeuvre is not None
+        if self.manoeuvre.over(state):
+            self.active = False
+            return self.idle(snapshot, state)
+        return self.manoeuvre.act(state, everybody(snapshot, state, ego=False))
+
+    def timing(self, aim: float) -> Trigger:
+        """The trigger that times the manoeuvre by the ego's arrival."""
+        return Arrival(self, aim)
+
+
+class Arrival:
+    """Holds when a vehicle that begins now meets the ego as its reaction zone arrives there.
+
+    The ego is expected to keep its speed; see ``triggers.Timing`` for the part ``aim``.
+    """
+
+    def __init__(self, driver: Driver, aim: float) -> None:
+        self.driver, self.aim = driver, aim
+
+    def __call__(self, snapshot: Snapshot, state: BodyState) -> bool:
+        if self.driver.manoeuvre is None:
+            return False
+        gap = self.driver.manoeuvre.gap(snapshot, state)
+        if gap is None:
+            return False
+        v = snapshot.ego.v
+        braking, reaction = 0.5 * v * v / MAX_DECEL, REACTION_TIME * v
+        return braking + MARGIN * reaction < gap <= braking + self.aim * reaction
+
+
+def everybody(snapshot: Snapshot, but: BodyState, *, ego: bool = True) -> Iterator[BodyState]:
+    """All bodies but one, the ego among them if wanted."""
+    yield from (other for other in snapshot.testers if other is not but)
+    yield from map(BodyState._make, snapshot.raw_background)
+    if ego:
+        yield snapshot.ego
