@@ -35,8 +35,8 @@ def draw_vehicles(
 ) -> tuple[Start, ...]:
     """One start for each body, apart from each other and from the ego, on different approaches.
 
-    An approach comes a second time only when all have come; crossing and merging ones are as
-    likely as the ego's own and the neighbouring lanes together. Consumes the generator.
+    Every approach is as likely as any other, and comes a second time only when all have come or
+    are full. Consumes the generator.
 
     Args:
         ego: the ego's box at its start.
@@ -68,11 +68,7 @@ def _choose(
     least = min(used[a] for a in approaches)
     # Where those are too short for another vehicle, any other will do.
     left = [a for a in approaches if used[a] == least] if rng.random() < 0.9 else list(approaches)
-    meeting = [a for a in left if math.isfinite(a.wait)]
-    along = [a for a in left if not math.isfinite(a.wait)]
-    halves = [half for half in (meeting, along) if half]
-    half = halves[int(rng.integers(len(halves)))]
-    return half[int(rng.integers(len(half)))]
+    return left[int(rng.integers(len(left)))]
 
 
 def _draw(

@@ -20,7 +20,7 @@ from collections.abc import Iterable
 from functools import lru_cache
 
 from cavsumo.bodies import Action, Kind
-from cavsumo.paths import Path
+from cavsumo.paths import Path, Projection
 from cavsumo.snapshot import BodyState
 
 LATERAL_MPS2 = 2.5  # acceleration sideways that bounds the speed in bends
@@ -57,12 +57,17 @@ class Course:
         """Arc length and lateral offset of a body, positive to the left [m]."""
         if self._last is None or self._last[0] is not state:
             here = self.path.project(state.x, state.y, self._segment)
-            self._segment, along = here.segment, here.along
-            if along >= self.path.length:
-                x, y, o = self.path.at(self.path.length)
-                along += max(0.0, (state.x - x) * math.cos(o) + (state.y - y) * math.sin(o))
-            self._last = state, along, here.lateral
+            self._segment = here.segment
+            self._last = state, *self._prolonged(here, state)
         return self._last[1], self._last[2]
+
+    def _prolonged(self, here: Projection, state: BodyState) -> tuple[float, float]:
+        """Arc length and lateral offset; behind its end the path goes straight on [m]."""
+        if here.along < self.path.length:
+            return here.along, here.lateral
+        x, y, o = self.path.at(self.path.length)
+        dx, dy, cos, sin = state.x - x, state.y - y, math.cos(o), math.sin(o)
+        return here.along + max(0.0, dx * cos + dy * sin), dy * cos - dx * sin
 
     def limit(self, along: float) -> float:
         """The speed at which the bends from here on can be driven, braking in time [m/s]."""
@@ -113,11 +118,11 @@ class Course:
             dx, dy = other.x - state.x, other.y - state.y
             if abs(dx) > SEEN_M or abs(dy) > SEEN_M or dx * cos + dy * sin <= 0.0:
                 continue
-            there = self.path.project(other.x, other.y)
-            axis = self.path.at(there.along)[2]
+            there, lateral = self._prolonged(self.path.project(other.x, other.y), other)
+            axis = self.path.at(there)[2]
             along, across = extent(other, axis)
-            gap = there.along - here - along - self.kind.length / 2
-            if gap + along <= 0.0 or abs(there.lateral) > across + self.kind.width / 2 + BESIDE_M:
+            gap = there - here - along - self.kind.length / 2
+            if gap + along <= 0.0 or abs(lateral) > across + self.kind.width / 2 + BESIDE_M:
                 continue
             onward = max(0.0, other.v * math.cos(other.o - axis))
             allowed = min(allowed, stopping_from(gap - KEEP_M - state.v * self.dt, onward, self.dt))

@@ -27,7 +27,32 @@ SIDEWAYS = 0.25  # speed sideways of a vehicle that cuts in, as a share of its s
 CUT_IN_LOOK_M = 9.0  # how gently it changes lanes: the distance of the point pursued
 SLOWED = 0.7  # speed after cutting in, as a share of the one before
 ARRIVED_M = 0.3  # so near the axis of a lane one is on it
+MOVING_OFF = 0.7  # an ego slower than this share of its speed limit that gains speed moves off
 FAR_M = 30.0  # a run that leads into the ego's lane has ended after this
+
+
+class Forecast:
+    """Where the ego will be: at the speed that it has, or gaining speed while it moves off."""
+
+    def __init__(self, scene: Scene, limit: float) -> None:
+        self.scene, self.limit = scene, limit
+        self.front = self.v = self.gaining = 0.0
+        self._seen = -1
+
+    def see(self, snapshot: Snapshot) -> None:
+        """Take in a snapshot."""
+        v, self._seen, before = snapshot.ego.v, snapshot.step, self._seen
+        gained = (v - self.v) / self.scene.dt if snapshot.step - before == 1 else 0.0
+        self.gaining = gained if v < MOVING_OFF * self.limit and gained > 0.0 else 0.0
+        self.front, self.v = self.scene.ego_progress(snapshot) + self.scene.ego.kind.length / 2, v
+
+    def after(self, time: float) -> tuple[float, float]:
+        """Arc length of its front on its path, and its speed, after a time [m, m/s]."""
+        if not self.gaining:
+            return self.front + self.v * time, self.v
+        gaining = min(time, (self.limit - self.v) / self.gaining)
+        v = self.v + self.gaining * gaining
+        return self.front + (self.v + v) / 2 * gaining + v * (time - gaining), v
 
 
 class Manoeuvre:
@@ -57,15 +82,13 @@ class Manoeuvre:
         """Whether it has ended, and the vehicle drives lawfully on."""
         return False
 
-    def gap(self, snapshot: Snapshot, state: BodyState) -> float | None:
+    def gap(self, ego: Forecast, state: BodyState) -> tuple[float, float] | None:
         """Room that an ego which drives on has left on meeting a vehicle that begins now [m].
 
-        Measured as the stopping zones count vehicles (``fairness``). None when they will not meet.
+        With it the ego's speed then [m/s]. Measured as the stopping zones count vehicles
+        (``fairness``). None when they will not meet.
         """
         raise NotImplementedError
-
-    def _front(self, snapshot: Snapshot) -> float:
-        return self.scene.ego_progress(snapshot) + self.scene.ego.kind.length / 2
 
 
 class Run(Manoeuvre):
@@ -84,15 +107,14 @@ class Run(Manoeuvre):
         end = min(self.approach.leave, self.approach.enter + FAR_M)
         return self.course.place(state)[0] > end
 
-    def gap(self, snapshot: Snapshot, state: BodyState) -> float | None:
+    def gap(self, ego: Forecast, state: BodyState) -> tuple[float, float] | None:
         if not self.possible(state):
             return None
         approach, path = self.approach, self.scene.ego_path
         time, v = self.course.time_to(state, approach.enter)
         turn = self.course.path.at(approach.enter)[2] - path.at(approach.ego_enter)[2]
-        way = snapshot.ego.v * (time + self.scene.dt)
-        still = drift(v * math.cos(turn), snapshot.ego.v, MAX_DECEL)
-        return approach.ego_enter - self._front(snapshot) - way + still
+        front, ego_v = ego.after(time + self.scene.dt)
+        return approach.ego_enter - front + drift(v * math.cos(turn), ego_v, MAX_DECEL), ego_v
 
 
 class Brake(Manoeuvre):
@@ -109,10 +131,10 @@ class Brake(Manoeuvre):
     def over(self, state: BodyState) -> bool:
         return self.standing > STANDS_S
 
-    def gap(self, snapshot: Snapshot, state: BodyState) -> float | None:
+    def gap(self, ego: Forecast, state: BodyState) -> tuple[float, float] | None:
         rear = self.course.place(state)[0] - state.body.kind.length / 2
-        stands = rear + drift(state.v, snapshot.ego.v, MAX_DECEL)
-        return stands - self._front(snapshot) - snapshot.ego.v * NOTICE_S
+        front, ego_v = ego.after(NOTICE_S)
+        return rear + drift(state.v, ego_v, MAX_DECEL) - front, ego_v
 
 
 class CutIn(Manoeuvre):
@@ -132,15 +154,16 @@ class CutIn(Manoeuvre):
     def over(self, state: BodyState) -> bool:
         return abs(self.course.place(state)[1]) < ARRIVED_M
 
-    def gap(self, snapshot: Snapshot, state: BodyState) -> float | None:
+    def gap(self, ego: Forecast, state: BodyState) -> tuple[float, float] | None:
         here = self.scene.ego_path.project(state.x, state.y)
         kind = state.body.kind
         if state.v <= 0.0 or not 0.0 < here.along < self.scene.ego_path.length:
             return None
         strips = (kind.width + self.scene.ego.kind.width) / 2
         time = max(0.0, abs(here.lateral) - strips) / (SIDEWAYS * state.v)
-        rear = here.along - kind.length / 2 + drift(state.v, snapshot.ego.v, MAX_DECEL)
-        return rear - self._front(snapshot) + (state.v - snapshot.ego.v) * time
+        rear = here.along - kind.length / 2 + state.v * time
+        front, ego_v = ego.after(time)
+        return rear + drift(state.v, ego_v, MAX_DECEL) - front, ego_v
 
 
 KNOWN: Mapping[str, type[Manoeuvre]] = {"run": Run, "brake": Brake, "cut-in": CutIn}
@@ -220,19 +243,21 @@ class Driver:
 class Arrival:
     """Holds when a vehicle that begins now meets the ego as its reaction zone arrives there.
 
-    The ego is expected to keep its speed; see ``triggers.Timing`` for the part ``aim``.
+    See ``triggers.Timing`` for the part ``aim``.
     """
 
     def __init__(self, driver: Driver, aim: float) -> None:
         self.driver, self.aim = driver, aim
+        self.ego = Forecast(driver.scene, driver.approach.ego_speed)
 
     def __call__(self, snapshot: Snapshot, state: BodyState) -> bool:
         if self.driver.manoeuvre is None:
             return False
-        gap = self.driver.manoeuvre.gap(snapshot, state)
-        if gap is None:
+        self.ego.see(snapshot)
+        meeting = self.driver.manoeuvre.gap(self.ego, state)
+        if meeting is None:
             return False
-        v = snapshot.ego.v
+        gap, v = meeting
         braking, reaction = 0.5 * v * v / MAX_DECEL, REACTION_TIME * v
         return braking + MARGIN * reaction < gap <= braking + self.aim * reaction
 
