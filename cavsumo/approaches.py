@@ -57,8 +57,9 @@ def approaches(
     kept = tuple(a for a in found if not wanted or a.type in wanted)
     if not kept:
         there = ", ".join(sorted({a.type for a in found}))
+        sort = " or ".join(wanted) + " " if wanted else ""
         raise NetworkError(
-            f"{network.file}: no {' or '.join(wanted) or 'way'} for a {kind.name} meets the ego's "
+            f"{network.file}: no {sort}way for a {kind.name} meets the ego's "
             f"route{f' (there are: {there})' if there else ''}; choose another with --junction or "
             "--ego-route"
         )

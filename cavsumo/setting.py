@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from cavsumo import __version__
+from cavsumo.agents.manoeuvres import types_for
 from cavsumo.assertions import ASSERTIONS
 from cavsumo.bodies import WALKING, Kind, kind_named
 from cavsumo.egos import make_ego
@@ -72,9 +73,8 @@ def prepare(plan: BatchPlan) -> Setting:
             "sequence; learn=false plays what was learned"
         )
     ego = make_ego(scenario.ego, scenario.ego_params)
-    site = derive_site(
-        scenario.net, scenario.ego_route, scenario.junction, ego.kind, kind, scenario.approaches
-    )
+    types = scenario.approaches or _types(plan)
+    site = derive_site(scenario.net, scenario.ego_route, scenario.junction, ego.kind, kind, types)
     return Setting(plan, site, str(Path.cwd()), checksums(plan), versions())
 
 
@@ -90,6 +90,13 @@ def _check_kind(plan: BatchPlan, kind: Kind) -> None:
                 f"kind {kind.name!r}: agent {name} can only walk; choose another agent or kind "
                 f"{' or '.join(WALKING)}"
             )
+
+
+def _types(plan: BatchPlan) -> tuple[str, ...]:
+    """The types of approach on which all agents can do the one manoeuvre asked of them."""
+    agents = [agent for name in plan.agents for agent in make_agents(plan, name)]
+    names = {getattr(agent, "manoeuvre", "auto") for agent in agents}
+    return types_for(names.pop()) if len(names) == 1 else ()
 
 
 def checksums(plan: BatchPlan) -> dict[str, str]:

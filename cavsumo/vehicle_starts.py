@@ -18,9 +18,12 @@ from cavsumo.geometry import Box, gap
 from cavsumo.roads import Approach, Start
 
 EARLIER_S = (0.5, 3.0)  # by how much a crossing vehicle would arrive before the ego
-AHEAD_S = (2.5, 5.0)  # how far ahead of the ego the others start, in seconds of the ego's way
-CALM = (0.6, 1.0)  # speed of a crossing vehicle, as a share of what it may drive
-SLOW = (0.4, 0.7)  # speed of one that the ego is to catch up with
+AHEAD_S = (2.0, 4.0)  # how far ahead of the ego the others start, in seconds of the ego's way
+CALM = (
+    0.6,
+    1.0,
+)  # speed of a vehicle that crosses or drives beside, as a share of what it may drive
+SLOW = (0.4, 0.7)  # speed of one ahead of the ego, which is to catch up with it
 BRAKING_MPS2 = 3.0  # a vehicle starts no faster than it can stop with this before it must wait
 APART_M = 3.0  # smallest gap between two bodies at the start
 ATTEMPTS = 100
@@ -83,7 +86,7 @@ def _draw(
     top = min(kind.v_max, approach.speed)
     if not meets:
         top = min(top, approach.ego_speed)
-    v = float(rng.uniform(*(CALM if meets else SLOW))) * top
+    v = float(rng.uniform(*(SLOW if approach.type == "following" else CALM))) * top
     if start_speed is not None:
         v = min(kind.v_max, start_speed)
     until = approach.ego_enter / approach.ego_speed  # when the ego is there [s]

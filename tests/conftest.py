@@ -61,7 +61,8 @@ def staged(networks: dict[str, Path]) -> Callable[..., tuple[BatchPlan, Site]]:
         plan = plan_from(chosen, "test")
         s = plan.scenario
         ego = repr(sorted(s.ego_params.items()))
-        key = (s.net, s.ego_route, s.junction, s.ego, ego, s.kind, s.approaches)
+        on_road = s.kind != "pedestrian" and (s.kind, s.approaches, repr(plan.params))
+        key = (s.net, s.ego_route, s.junction, s.ego, ego, on_road)
         if key not in sites:
             sites[key] = prepare(plan).site
         return plan, sites[key]

@@ -35,7 +35,7 @@ SEEN_M = 40.0  # who is farther away is not looked at
 KEEP_M = 2.0  # gap kept to who stands ahead
 BESIDE_M = 0.3  # room beside a body that one drives past
 PATIENCE_S = 12.0  # a drive is not foreseen for longer
-RUN_OUT_M = 12.0  # so far behind the end of its path a vehicle comes to rest
+RUN_OUT_M = 12.0  # so far behind the end of its path a vehicle has left the road
 
 
 class Course:

@@ -22,10 +22,11 @@ from cavsumo.snapshot import BodyState, Snapshot
 MANOEUVRES = ("auto", "run", "brake", "cut-in")
 CREEPING_MPS = 2.0  # a lawful vehicle goes no slower than this to where it waits
 STANDS_S = 3.0  # one that braked drives on after this time
-NOTICE_S = 1.0  # an ego that follows is taken to notice a brake light after this time
-SIDEWAYS = 0.25  # speed sideways of a vehicle that cuts in, as a share of its speed
-CUT_IN_LOOK_M = 9.0  # how gently it changes lanes: the distance of the point pursued
+NOTICE_S = 0.7  # an ego that follows is taken to notice a brake light after this time
+STANDING_M = 2.5  # and to come to a stand so far behind
+CUT_IN_LOOK_M = 7.0  # how gently it changes lanes: the distance of the point pursued
 SLOWED = 0.7  # speed after cutting in, as a share of the one before
+STOPPING_M = 30.0  # so far before the end of its way it minds that again
 ARRIVED_M = 0.3  # so near the axis of a lane one is on it
 MOVING_OFF = 0.7  # an ego slower than this share of its speed limit that gains speed moves off
 FAR_M = 30.0  # a run that leads into the ego's lane has ended after this
@@ -134,7 +135,7 @@ class Brake(Manoeuvre):
     def gap(self, ego: Forecast, state: BodyState) -> tuple[float, float] | None:
         rear = self.course.place(state)[0] - state.body.kind.length / 2
         front, ego_v = ego.after(NOTICE_S)
-        return rear + drift(state.v, ego_v, MAX_DECEL) - front, ego_v
+        return rear + drift(state.v, ego_v, MAX_DECEL) - front - STANDING_M, ego_v
 
 
 class CutIn(Manoeuvre):
@@ -144,23 +145,30 @@ class CutIn(Manoeuvre):
 
     def begin(self, state: BodyState) -> None:
         assert self.approach.into is not None
-        self.speed = SLOWED * state.v
-        kind = state.body.kind
-        self.course = Course(self.approach.into, kind, self.scene.dt, max(self.speed, 1.0))
+        kind, top = state.body.kind, max(state.v, CREEPING_MPS)
+        self.course = Course(self.approach.into, kind, self.scene.dt, top)
+        self.slowed = SLOWED * top
+        self.arrived = False
 
     def act(self, state: BodyState, others: Iterator[BodyState]) -> Action:
-        return self.course.drive(state, self.course.room(state, others), look=CUT_IN_LOOK_M)
+        self.arrived = self.arrived or abs(self.course.place(state)[1]) < ARRIVED_M
+        allowed = self.course.room(state, others)
+        if self.arrived:
+            return self.course.drive(state, min(allowed, self.slowed))
+        return self.course.drive(state, allowed, look=CUT_IN_LOOK_M)
 
     def over(self, state: BodyState) -> bool:
-        return abs(self.course.place(state)[1]) < ARRIVED_M
+        end = self.course.path.length - STOPPING_M
+        return self.arrived and self.course.place(state)[0] > end
 
     def gap(self, ego: Forecast, state: BodyState) -> tuple[float, float] | None:
         here = self.scene.ego_path.project(state.x, state.y)
         kind = state.body.kind
         if state.v <= 0.0 or not 0.0 < here.along < self.scene.ego_path.length:
             return None
+        # Pursuing a point at the distance L on a line, a body closes in on it as exp(-way / L).
         strips = (kind.width + self.scene.ego.kind.width) / 2
-        time = max(0.0, abs(here.lateral) - strips) / (SIDEWAYS * state.v)
+        time = CUT_IN_LOOK_M * math.log(max(1.0, abs(here.lateral) / strips)) / state.v
         rear = here.along - kind.length / 2 + state.v * time
         front, ego_v = ego.after(time)
         return rear + drift(state.v, ego_v, MAX_DECEL) - front, ego_v
@@ -175,6 +183,11 @@ def manoeuvre_on(name: str, type_: str) -> type[Manoeuvre] | None:
         if name in ("auto", known) and type_ in manoeuvre.types:
             return manoeuvre
     return None
+
+
+def types_for(name: str) -> tuple[str, ...]:
+    """The types of approach on which a manoeuvre is possible; none in particular for "auto"."""
+    return () if name == "auto" else KNOWN[name].types
 
 
 class Driver:
@@ -197,13 +210,16 @@ class Driver:
         chosen = manoeuvre_on(name, approach.type)
         self.manoeuvre = chosen(scene, approach, self.course) if chosen else None
         self.active = self._begun = False
+        # Beyond the end of a road nobody in SUMO sees a body. There it is out of the way of all but
+        # those behind it, so who drives ahead of the ego stops before.
+        self._run_out = RUN_OUT_M if waits else -kind.length / 2
 
     def idle(self, snapshot: Snapshot, state: BodyState) -> Action:
         """Drive lawfully, or do nothing before it begins."""
         if self._noop and not self._begun:
             return NOOP
         here, dt = self.course.place(state)[0], self.scene.dt
-        left = self.course.path.length + RUN_OUT_M - here - state.v * dt
+        left = self.course.path.length + self._run_out - here - state.v * dt
         allowed = self.course.room(state, everybody(snapshot, state))
         if not self._begun and here < self.approach.enter:
             left = min(left, self.approach.wait - here - state.v * dt)
@@ -223,7 +239,7 @@ class Driver:
         if self.manoeuvre is None or self._begun or not self.manoeuvre.possible(state):
             return False
         self.manoeuvre.begin(state)
-        self.course = self.manoeuvre.course
+        self.course = self.manoeuvre.course  # cutting in leads to another
         self.active = self._begun = True
         return True
 
