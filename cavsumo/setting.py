@@ -11,6 +11,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from cavsumo import __version__
 from cavsumo.agents.manoeuvres import types_for
 from cavsumo.assertions import ASSERTIONS
@@ -75,6 +77,9 @@ def prepare(plan: BatchPlan) -> Setting:
     ego = make_ego(scenario.ego, scenario.ego_params)
     types = scenario.approaches or _types(plan)
     site = derive_site(scenario.net, scenario.ego_route, scenario.junction, ego.kind, kind, types)
+    if site.approaches:  # that there is room for them must not come out an episode at a time
+        kinds, rng = [kind] * scenario.testers, np.random.default_rng(plan.seed)
+        site.draw(kinds, ego.kind, scenario.start_speed, rng)
     return Setting(plan, site, str(Path.cwd()), checksums(plan), versions())
 
 

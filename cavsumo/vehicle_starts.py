@@ -50,9 +50,10 @@ def draw_vehicles(
     starts: list[Start] = []
     boxes, used = [ego], Counter[Approach]()
     for kind in kinds:
-        for _ in range(ATTEMPTS):
+        for attempt in range(ATTEMPTS):
             approach = _choose(approaches, used, rng)
-            start = _draw(approach, kind, ego, start_speed, rng)
+            anywhere = attempt >= ATTEMPTS // 2  # better not in time than not at all
+            start = _draw(approach, kind, ego, start_speed, anywhere, rng)
             box = Box(start.x, start.y, start.o, kind.length, kind.width)
             if all(gap(box, other) > APART_M for other in boxes):
                 starts.append(start)
@@ -79,9 +80,10 @@ def _draw(
     kind: Kind,
     ego: Box,
     start_speed: float | None,
+    anywhere: bool,
     rng: np.random.Generator,
 ) -> Start:
-    """A start on an approach."""
+    """A start on an approach, in time for the ego unless it may be anywhere."""
     meets = math.isfinite(approach.wait)
     top = min(kind.v_max, approach.speed)
     if not meets:
@@ -96,7 +98,8 @@ def _draw(
     else:
         lead = float(rng.uniform(*AHEAD_S)) * approach.ego_speed
         along = approach.enter + lead + (ego.length + kind.length) / 2 - v * until
-    along = min(max(along, kind.length / 2), approach.path.length)
+    first, last = kind.length / 2, min(approach.wait, approach.path.length - kind.length / 2)
+    along = float(rng.uniform(first, last)) if anywhere else max(first, min(along, last))
     if meets and start_speed is None:
         v = min(v, math.sqrt(2.0 * BRAKING_MPS2 * max(0.0, approach.wait - along)))
     x, y, o = approach.path.at(along)

@@ -24,6 +24,7 @@ from cavsumo.bodies import PEDESTRIAN, Body
 from cavsumo.demand import Demand, Departures, Lights, cleared, noted, types_only
 from cavsumo.egos.base import Acceleration, Command, Drive, Ego
 from cavsumo.errors import NoSuchAction, SimulationError
+from cavsumo.geometry import Box, gap
 from cavsumo.kinematics import steering_for_turn, step_floats, wrap
 from cavsumo.options import OPTIONS
 from cavsumo.roads import Start
@@ -41,6 +42,7 @@ KEEP_EXACT_ANY_LANE = 6  # the same for persons, on lanes for cars too
 # moveToXY looks for lanes within this distance only; SUMO's default of 100 m costs ten times as
 # much per call for a body off the road, and no lane is wider than twice this.
 MATCH_M = 5.0
+ROOM_M = 2.0  # traffic nearer to a tester vehicle than this at the start is taken away
 UNSAFE = 0  # setSpeedMode: no check of SUMO's own interferes with what was commanded
 
 
@@ -108,6 +110,7 @@ class World:
             self._begin(seed, simulation)
             self._insert(states, starts)
             ego = self._enter(states)
+            self._make_room(states, starts)
         self._ego = ego
         self._background = self._lookout(everything, (ego, *states))
         return self._snapshot(ego, tuple(states))
@@ -243,6 +246,23 @@ class World:
         raise SimulationError(
             f"the ego found no room to enter edge {self.site.route.edges[0]!r} in {ENTRY_S:g} s"
         )
+
+    def _make_room(self, states: Sequence[BodyState], starts: Sequence[Start]) -> None:
+        """Take traffic away that SUMO let in where a tester vehicle stands.
+
+        Who departs in the first timestep comes before SUMO knows of the testers.
+        """
+        boxes = [s.box for s, start in zip(states, starts, strict=True) if start.approach]
+        mine = {EGO, *(s.id for s in states)}
+        if not boxes:
+            return
+        for name in self._vehicles:
+            length, width = libsumo.vehicle.getLength(name), libsumo.vehicle.getWidth(name)
+            x, y = libsumo.vehicle.getPosition(name)
+            pose = from_sumo(x, y, libsumo.vehicle.getAngle(name), length)
+            if name not in mine and min(gap(Box(*pose, length, width), b) for b in boxes) < ROOM_M:
+                libsumo.vehicle.remove(name)
+        self._vehicles = libsumo.vehicle.getIDList()
 
     def _is_person(self, state: BodyState) -> bool:
         """Whether SUMO is shown a person; only pedestrians can be persons."""
