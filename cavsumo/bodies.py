@@ -68,7 +68,7 @@ BICYCLE = Kind(
     "bicycle", 2.25, 0.875, 2.025, 0.0, 4.5, -4.5, 4.5, steering_max=math.nextafter(math.pi / 2, 0)
 )
 KINDS: Mapping[str, Kind] = {k.name: k for k in (PEDESTRIAN, CAR, BUS, BICYCLE)}
-WALKING = (PEDESTRIAN.name, BICYCLE.name)  # kinds that start on pavements
+WALKING = (PEDESTRIAN.name,)  # kinds that start on pavements; the others start on lanes for cars
 
 
 def kind_named(name: str) -> Kind:

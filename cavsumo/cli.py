@@ -16,6 +16,7 @@ from cavsumo.errors import BatchError, CavsumoError, Exit, InputError
 # Settings that the command line takes over as they are.
 PLAIN = (
     "net routes traffic ego junction signal agents runs seed end step_length testers kind jaywalk "
+    "approaches "
     "bodies_per_agent embodiment sumo_width start_speed trace assertions "
     "reset shard first until_tests until_half_width until_rate"
 ).split()
@@ -203,12 +204,19 @@ def _add_testers(group: Any) -> None:
         metavar="KEY=VALUE",
         help="parameter of the agents that have it; AGENT.KEY=VALUE for one of them",
     )
-    add("--kind", help="kind of body (default pedestrian)")
+    add("--kind", help="kind of body: pedestrian (default), car, bus or bicycle")
     add(
         "--jaywalk",
         action=argparse.BooleanOptionalAction,
         default=None,
         help="start anywhere beside the road, also where there is no pavement",
+    )
+    add(
+        "--approach",
+        dest="approaches",
+        action="append",
+        metavar="TYPE",
+        help="of vehicles: crossing, merging, following or adjacent; repeat for several",
     )
     add("--bodies-per-agent", type=int, metavar="N", help="default 1")
     add("--embodiment", choices=("vehicle", "person"), help="what SUMO is shown")

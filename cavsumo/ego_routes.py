@@ -9,7 +9,14 @@ from itertools import pairwise
 from typing import Any
 
 from cavsumo.errors import NetworkError, UnknownName
-from cavsumo.network import Network, driving_lanes, is_normal, is_pavement, lane_path
+from cavsumo.network import (
+    Network,
+    driving_lanes,
+    interior,
+    is_normal,
+    is_pavement,
+    lane_path,
+)
 from cavsumo.paths import Path
 
 APPROACH_M = 80.0  # how far before the junction the ego starts, where the roads allow it
@@ -323,16 +330,5 @@ def _chain(network: Network, lane: Any, onward: Sequence[Any]) -> list[Any] | No
             continue
         rest = _chain(network, target, onward[1:])
         if rest is not None:
-            return [lane, *_interior(network, link), *rest]
+            return [lane, *interior(network, link), *rest]
     return None
-
-
-def _interior(network: Network, link: Any) -> list[Any]:
-    """The lanes inside a junction that a connection leads over."""
-    lanes: list[Any] = []
-    while link is not None and link.getViaLaneID():
-        via = network.net.getLane(link.getViaLaneID())
-        lanes.append(via)
-        onward = via.getOutgoing()
-        link = onward[0] if onward else None
-    return lanes

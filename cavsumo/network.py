@@ -203,6 +203,17 @@ def lane_areas(lanes: Sequence[Any]) -> list[shapely.Geometry]:
     return list(shapely.buffer(axes, halves, cap_style="flat", join_style="mitre"))
 
 
+def interior(network: Network, link: Any) -> list[Any]:
+    """The lanes inside a junction that a connection leads over."""
+    lanes: list[Any] = []
+    while link is not None and link.getViaLaneID():
+        via = network.net.getLane(link.getViaLaneID())
+        lanes.append(via)
+        onward = via.getOutgoing()
+        link = onward[0] if onward else None
+    return lanes
+
+
 def _root(file: FilePath) -> dict[str, str]:
     """The attributes of a network's <net>; refuses what is not XML, or other XML."""
     opener = gzip.open if file.suffix == ".gz" else open

@@ -68,6 +68,11 @@ class Path:
         t = along - self._starts[i]
         return x0 + t * ux, y0 + t * uy, math.atan2(uy, ux)
 
+    def curvature(self, along: float, window: float = 3.0) -> float:
+        """Mean change of heading per metre within a window to either side [1/m], >= 0."""
+        before, after = self.at(along - window)[2], self.at(along + window)[2]
+        return abs(math.remainder(after - before, math.tau)) / (2.0 * window)
+
     def meet(self, x: float, y: float, heading: float) -> tuple[float, float] | None:
         """Where a ray first meets the path: (distance on the ray, arc length), or None [m]."""
         cos, sin = math.cos(heading), math.sin(heading)

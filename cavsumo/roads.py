@@ -1,4 +1,4 @@
-"""Where the carriageway is and how to get across it, on any road of any network.
+"""Where the carriageway is, how to get across it and along it, on any road of any network.
 
 Pure geometry (shapely): built from polygons and lane axes, knows neither files nor SUMO.
 """
@@ -49,9 +49,47 @@ class Crossing:
         return (x - self.x) * self._cos + (y - self.y) * self._sin
 
 
+# How a vehicle's way lies to the ego's: across it, into its lane, on its lane ahead of it, in a
+# lane beside it.
+APPROACHES = ("crossing", "merging", "following", "adjacent")
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Approach:
+    """A way along lanes on which a vehicle can meet the ego.
+
+    Arc lengths are those of the centre of a body that follows the path [m].
+
+    Attributes:
+        type: one of APPROACHES.
+        path: centre line of its lanes, through the junction and on.
+        edges: ids of the edges along it.
+        wait: where a body waits that gives way; infinite where there is nothing to wait for.
+        enter, leave: where a body begins to touch the strip that the ego sweeps, and where it
+            no longer does (infinite if it stays); beside the ego's lane, where the lanes begin
+            and cease to run side by side.
+        ego_enter: arc length on the ego's path at which it would touch a body that enters.
+        yields: whether the traffic rules or lights make it give way to the ego.
+        speed, ego_speed: speed limits on the ways to there, its own and the ego's [m/s].
+        into: for a lane beside the ego's, the ego's own lane and on.
+    """
+
+    type: str
+    path: Path
+    edges: tuple[str, ...]
+    wait: float
+    enter: float
+    leave: float
+    ego_enter: float
+    yields: bool
+    speed: float
+    ego_speed: float
+    into: Path | None = None
+
+
 @dataclass(frozen=True, slots=True)
 class Start:
-    """Where a tester's body starts, and the pavement it stands on.
+    """Where a tester's body starts, and the pavement it stands on or the way it drives.
 
     Attributes:
         x, y, o: position [m] and orientation [rad].
@@ -59,6 +97,8 @@ class Start:
         lateral: offset from that axis, positive to its left [m].
         forwards: whether the body faces along the axis (True) or against it.
         walk: ids of edges along which SUMO may believe a person here to walk.
+        approach: the way that a vehicle drives, None for who walks.
+        v: speed [m/s]; None leaves it to the scenario.
     """
 
     x: float
@@ -68,6 +108,8 @@ class Start:
     lateral: float = 0.0
     forwards: bool = True
     walk: tuple[str, ...] = ()
+    approach: Approach | None = None
+    v: float | None = None
 
 
 class Roads:

@@ -28,6 +28,7 @@ SHARED_BY = 25  # episodes that share one simulation when asked to
 Finite = Annotated[float, Field(allow_inf_nan=False)]
 # Whose simulation an episode is played in: its own, or one that later episodes use as the same.
 Simulation = Literal["own", "new", "same"]
+ApproachType = Literal["crossing", "merging", "following", "adjacent"]
 Params = dict[str, bool | int | float | str]
 
 
@@ -55,6 +56,9 @@ class Scenario(BaseModel):
     )
     testers: int = Field(3, ge=1, le=100, description="number of tester bodies")
     kind: str = Field("pedestrian", description="kind of the tester bodies")
+    approaches: tuple[ApproachType, ...] = Field(
+        (), description="types of approach on which tester vehicles start; all if not given"
+    )
     jaywalk: bool = Field(
         False, description="testers start anywhere beside the road, not on pavements only"
     )

@@ -12,14 +12,17 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from cavsumo import __version__
+from cavsumo.agents.manoeuvres import types_for
 from cavsumo.assertions import ASSERTIONS
-from cavsumo.bodies import WALKING, kind_named
+from cavsumo.bodies import WALKING, Kind, kind_named
 from cavsumo.demand import BEYOND_S
 from cavsumo.egos import make_ego
 from cavsumo.egos.base import Ego
 from cavsumo.errors import InputError
-from cavsumo.jobs import check_agents, learners
+from cavsumo.jobs import check_agents, learners, make_agents
 from cavsumo.options import OPTIONS
 from cavsumo.scenario import BatchPlan
 from cavsumo.signals import Pace
@@ -68,8 +71,8 @@ def prepare(plan: BatchPlan) -> Setting:
     check_agents(plan)
     for name in scenario.assertions:
         ASSERTIONS.make(name, scenario.assertion_params)
-    if kind_named(scenario.kind).name not in WALKING and scenario.jaywalk:
-        raise InputError(f"jaywalk: only {' and '.join(WALKING)} start beside the road")
+    kind = kind_named(scenario.kind)
+    _check_kind(plan, kind)
     if learners(plan) and (plan.shard or plan.reset == "shared"):
         what = f"shard {plan.shard}" if plan.shard else "reset shared"
         raise InputError(
@@ -78,21 +81,30 @@ def prepare(plan: BatchPlan) -> Setting:
         )
     ego = make_ego(scenario.ego, scenario.ego_params)
     site = derive_site(
-        scenario.net, scenario.ego_route, scenario.junction, ego.kind.length, wishes(plan, ego)
+        scenario.net, scenario.ego_route, scenario.junction, ego.kind, wishes(plan, kind, ego)
     )
     if scenario.embodiment == "person" and not all(area.walk for area in site.areas):
         raise InputError("jaywalk: embodiment person needs a pavement near by, and there is none")
+    if site.approaches:  # that there is room for them must not come out an episode at a time
+        kinds, rng = [kind] * scenario.testers, np.random.default_rng(plan.seed)
+        site.draw(kinds, ego.kind, scenario.start_speed, rng)
     return Setting(plan, site, str(Path.cwd()), checksums(plan), versions())
 
 
-def wishes(plan: BatchPlan, ego: Ego) -> Wishes:
+def wishes(plan: BatchPlan, kind: Kind, ego: Ego) -> Wishes:
     """What a plan asks of its site besides the route."""
     scenario = plan.scenario
-    pace = Pace(ego.depart_speed, _top_speed(ego))
     volume = None
     if scenario.traffic is not None:
         volume = Volume(*scenario.traffic, duration=scenario.end + BEYOND_S, seed=plan.seed)
-    return Wishes(scenario.jaywalk, volume, scenario.signal, pace)
+    return Wishes(
+        kind=kind,
+        types=scenario.approaches or _types(plan),
+        jaywalk=scenario.jaywalk,
+        volume=volume,
+        signal=scenario.signal,
+        pace=Pace(ego.depart_speed, _top_speed(ego)),
+    )
 
 
 def _top_speed(ego: Ego) -> float:
@@ -101,6 +113,29 @@ def _top_speed(ego: Ego) -> float:
         return min(ego.kind.v_max, float(ego.vtype().get("maxSpeed", math.inf)))
     except ValueError:
         return ego.kind.v_max
+
+
+def _check_kind(plan: BatchPlan, kind: Kind) -> None:
+    """Refuse what walkers or vehicles cannot do."""
+    if plan.scenario.jaywalk and kind.name not in WALKING:
+        raise InputError(f"jaywalk: only {' and '.join(WALKING)}s start beside the road")
+    if kind.name in WALKING:
+        if plan.scenario.approaches:
+            raise InputError(f"kind {kind.name!r}: only vehicles have approaches; name a --kind")
+        return
+    for name in plan.agents:
+        if not all(agent.drives for agent in make_agents(plan, name)):
+            raise InputError(
+                f"kind {kind.name!r}: agent {name} can only walk; choose another agent or kind "
+                f"{' or '.join(WALKING)}"
+            )
+
+
+def _types(plan: BatchPlan) -> tuple[str, ...]:
+    """The types of approach on which all agents can do the one manoeuvre asked of them."""
+    agents = [agent for name in plan.agents for agent in make_agents(plan, name)]
+    names = {getattr(agent, "manoeuvre", "auto") for agent in agents}
+    return types_for(names.pop()) if len(names) == 1 else ()
 
 
 def checksums(plan: BatchPlan) -> dict[str, str]:

@@ -24,7 +24,6 @@ from cavsumo.scenario import Simulation
 from cavsumo.scene import Scene
 from cavsumo.site import Site
 from cavsumo.snapshot import BodyState, Snapshot
-from cavsumo.starts import draw_starts
 from cavsumo.world import World
 
 # An episode whose verdict is open at the horizon may run on for this long [s].
@@ -117,17 +116,20 @@ def _reset(
     streams = np.random.SeedSequence(seed).spawn(2 + len(agents))
     placing, electing, *rest = (np.random.default_rng(s) for s in streams)
     kinds = [body.kind for body in stage.bodies]
-    starts = draw_starts(stage.site.areas, kinds, placing)
+    ego = stage.world.ego_body
+    starts = stage.site.draw(kinds, ego.kind, stage.start_speed, placing)
     scene = Scene(
         stage.world.dt,
-        stage.world.ego_body,
+        ego,
         stage.site.route.path,
         stage.bodies,
         starts,
         stage.site.roads,
     )
     watching: list[Ego | Agent | Assertion] = [stage.ego, *agents, *stage.assertions]
-    everything = record or any(who.sees_background for who in watching)
+    # Vehicles keep their distance to whoever is ahead of them, so they see everybody.
+    driving = any(start.approach for start in starts)
+    everything = record or driving or any(who.sees_background for who in watching)
     snapshot = stage.world.reset(
         seed, _states(stage, starts), starts, everything=everything, simulation=simulation
     )
@@ -143,11 +145,13 @@ def _reset(
 def _states(stage: Stage, starts: Sequence[Start]) -> list[BodyState]:
     """The testers' first states."""
 
-    def speed(kind: Kind) -> float:
+    def speed(kind: Kind, start: Start) -> float:
+        if start.v is not None:
+            return start.v
         return kind.v_max if stage.start_speed is None else min(kind.v_max, stage.start_speed)
 
     return [
-        BodyState(body, start.x, start.y, speed(body.kind), start.o)
+        BodyState(body, start.x, start.y, speed(body.kind, start), start.o)
         for body, start in zip(stage.bodies, starts, strict=True)
     ]
 

@@ -23,6 +23,7 @@ from cavsumo.background import Background, Roaming, roaming
 from cavsumo.bodies import PEDESTRIAN, Body
 from cavsumo.egos.base import Acceleration, Command, Drive, Ego
 from cavsumo.errors import NoSuchAction, SimulationError
+from cavsumo.geometry import Box, gap
 from cavsumo.kinematics import steering_for_turn, step_floats, wrap
 from cavsumo.roads import Start
 from cavsumo.scenario import Scenario, Simulation
@@ -39,6 +40,7 @@ KEEP_EXACT_ANY_LANE = 6  # the same for persons, on lanes for cars too
 # moveToXY looks for lanes within this distance only; SUMO's default of 100 m costs ten times as
 # much per call for a body off the road, and no lane is wider than twice this.
 MATCH_M = 5.0
+ROOM_M = 2.0  # traffic nearer to a tester vehicle than this at the start is taken away
 UNSAFE = 0  # setSpeedMode: no check of SUMO's own interferes with what was commanded
 
 
@@ -99,11 +101,13 @@ class World:
         self.teleports = self.emergency_stops = 0
         self._driven: BodyState | None = None
         self._told: dict[str, tuple[BodyState, tuple[float, float, float]]] = {}
+        self._vehicles: tuple[str, ...] = ()
         self._step, self._steering = 0, 0.0
         with self._listening():
             self.simulations.begin(seed, simulation)
             self._insert(states, starts)
             ego = self._enter(states)
+            self._make_room(states, starts)
         self._ego = ego
         self._background = self._lookout(everything, (ego, *states))
         return self._snapshot(ego, tuple(states))
@@ -170,7 +174,7 @@ class World:
                 libsumo.person.appendWalkingStage(state.id, list(edges), 0.0)
             else:
                 kind = state.body.kind.name
-                libsumo.vehicle.add(state.id, "cavsumo_tester", typeID=f"cavsumo_{kind}")
+                libsumo.vehicle.add(state.id, _route_of(start), typeID=f"cavsumo_{kind}")
         self._place(states)
 
     def _enter(self, states: Sequence[BodyState]) -> BodyState:
@@ -189,6 +193,23 @@ class World:
         raise SimulationError(
             f"the ego found no room to enter edge {self.site.route.edges[0]!r} in {ENTRY_S:g} s"
         )
+
+    def _make_room(self, states: Sequence[BodyState], starts: Sequence[Start]) -> None:
+        """Take traffic away that SUMO let in where a tester vehicle stands.
+
+        Who departs in the first timestep comes before SUMO knows of the testers.
+        """
+        boxes = [s.box for s, start in zip(states, starts, strict=True) if start.approach]
+        mine = {EGO, *(s.id for s in states)}
+        if not boxes:
+            return
+        for name in self._vehicles:
+            length, width = libsumo.vehicle.getLength(name), libsumo.vehicle.getWidth(name)
+            x, y = libsumo.vehicle.getPosition(name)
+            pose = from_sumo(x, y, libsumo.vehicle.getAngle(name), length)
+            if name not in mine and min(gap(Box(*pose, length, width), b) for b in boxes) < ROOM_M:
+                libsumo.vehicle.remove(name)
+        self._vehicles = libsumo.vehicle.getIDList()
 
     def _is_person(self, state: BodyState) -> bool:
         """Whether SUMO is shown a person; only pedestrians can be persons."""
@@ -281,3 +302,13 @@ class World:
             self.collisions.add((a, b))
         self.teleports += len(simulation.getStartingTeleportIDList())
         self.emergency_stops += len(simulation.getEmergencyStoppingVehiclesIDList())
+
+
+def _route_of(start: Start) -> str:
+    """The id of SUMO's route for a tester: its way, by which others see where it will go."""
+    if start.approach is None:
+        return "cavsumo_tester"
+    name = " ".join(("cavsumo", *start.approach.edges))
+    if name not in libsumo.route.getIDList():  # a shared simulation has it already
+        libsumo.route.add(name, list(start.approach.edges))
+    return name

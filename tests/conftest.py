@@ -63,7 +63,8 @@ def staged(networks: dict[str, Path]) -> Callable[..., tuple[BatchPlan, Site]]:
         s = plan.scenario
         ego = (s.ego, repr(sorted(s.ego_params.items())))
         drawn = (s.traffic, plan.seed, s.end) if s.traffic else ()
-        key = (s.net, s.ego_route, s.junction, *ego, s.jaywalk, s.signal, *drawn)
+        on_road = s.kind != "pedestrian" and (s.kind, s.approaches, repr(plan.params))
+        key = (s.net, s.ego_route, s.junction, *ego, s.jaywalk, s.signal, on_road, *drawn)
         if key not in sites:
             sites[key] = prepare(plan).site
         return plan, sites[key]

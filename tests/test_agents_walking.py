@@ -232,7 +232,7 @@ def test_timing_by_hand(straight_scene: MakeScene) -> None:
         ego = BodyState(scene.ego, float(x), LANE, SPEED, 0.0)
         tester = BodyState(scene.bodies[0], 60.0, -SOUTH, 1.4, -math.pi / 2)
         seen = Snapshot(0, 0.0, ego, 0.0, (tester,))
-        if agent.choose_action(seen) != (NOOP,) or agent.crossings[0].active:
+        if agent.choose_action(seen) != (NOOP,) or agent.behaviours[0].active:
             goes.append(float(x))
     assert min(goes) == pytest.approx(23.99943, abs=0.011)
     assert 25.5 < max(goes) < 26.27756

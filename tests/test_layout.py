@@ -16,12 +16,13 @@ PACKAGE = Path(cavsumo.__file__).parent
 
 # From the ground up: a module uses only what stands before it, lazily or not.
 ORDER = """
-    cavsumo errors checks registry kinematics geometry paths bodies snapshot roads
+    cavsumo errors checks registry kinematics geometry paths bodies snapshot fairness roads
     sumo_poses background
-    network ego_routes starts kerbs signals trips traffic site scene
+    network ego_routes lane_chains approaches starts vehicle_starts kerbs signals trips traffic
+    site scene
     osm handedness netconvert facts inspection layers picture
-    agents.base agents.walking agents.triggers agents.random agents.features
-    agents.programmed agents.election agents.qlearning agents
+    agents.base agents.walking agents.driving agents.triggers agents.random agents.features
+    agents.manoeuvres agents.behaviours agents.programmed agents.election agents.qlearning agents
     contacts
     assertions.base assertions.collision assertions.reaction_zone assertions
     egos.base egos.constant egos.sumo egos.time_gap egos.controller egos

@@ -21,11 +21,13 @@ class Agent:
     Attributes:
         sees_background: whether it looks at the background traffic. Set False where it does not:
             when nobody in an episode does, far bodies are left out of the snapshots.
+        drives: whether its bodies may be vehicles. Set False where it can only walk.
     """
 
     PARAMETERS: ClassVar[Mapping[str, str]] = {}
     learns: bool = False  # whether episodes change what it knows: then they are played in sequence
     sees_background: bool = True
+    drives: bool = True
 
     scene: Scene
     owned: tuple[int, ...]

@@ -8,7 +8,7 @@ from typing import ClassVar
 import numpy as np
 
 from cavsumo.agents.base import AGENTS, Agent
-from cavsumo.agents.programmed import IDLE_DOC, ProgrammedAgent
+from cavsumo.agents.programmed import IDLE_DOC, MANOEUVRE_DOC, ProgrammedAgent
 from cavsumo.agents.triggers import distance_ahead, ego_distance
 from cavsumo.checks import choice, number
 from cavsumo.snapshot import BodyState, Snapshot
@@ -26,12 +26,17 @@ class ElectionAgent(ProgrammedAgent):
         "distance_m": "a body nearer to the ego than this votes to cross [m]",
         "rule": "elect the nearest body 'ahead' of the ego, or the nearest 'unsigned' (CAV-Gym)",
         "idle": IDLE_DOC,
+        "manoeuvre": MANOEUVRE_DOC,
     }
 
     def __init__(
-        self, distance_m: float = 34.0, rule: str = "ahead", idle: str = "pavement"
+        self,
+        distance_m: float = 34.0,
+        rule: str = "ahead",
+        idle: str = "pavement",
+        manoeuvre: str = "auto",
     ) -> None:
-        super().__init__(idle)
+        super().__init__(idle, manoeuvre)
         self.distance_m = number("distance_m", distance_m, 0.0)
         self.rule = choice("rule", rule, ("ahead", "unsigned"))
 
@@ -58,7 +63,7 @@ class ElectionAgent(ProgrammedAgent):
 
     def crossing_bodies(self) -> list[int]:
         """The owned bodies that are crossing."""
-        return [j for j, walk in zip(self.owned, self.crossings, strict=True) if walk.active]
+        return [j for j, b in zip(self.owned, self.behaviours, strict=True) if b.active]
 
 
 class Coordinator:

@@ -1,62 +1,49 @@
 """Algorithms 3 and 4 of the seed: a programmed behaviour, begun by chance or by a trigger.
 
-The behaviour is to cross the road. While it is inactive the bodies idle: they walk along their
-pavement, go to the kerb and wait, or do nothing (the seed's noop).
+The behaviour of a pedestrian is to cross the road. While it is inactive the bodies idle: they walk
+along their pavement, go to the kerb and wait, or do nothing (the seed's noop). That of a vehicle
+is a manoeuvre, before which it drives lawfully, or does nothing.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import ClassVar, Protocol
+from typing import ClassVar
 
 import numpy as np
 
 from cavsumo.agents.base import AGENTS, Agent
+from cavsumo.agents.behaviours import behaviour
+from cavsumo.agents.manoeuvres import MANOEUVRES
 from cavsumo.agents.random import EPSILON_DOC, RATE_DOC, Exploration
-from cavsumo.agents.triggers import Proximity, Timing, Trigger
-from cavsumo.agents.walking import ApproachKerb, CrossingWalk, Stroll
-from cavsumo.bodies import NOOP, Action
+from cavsumo.agents.triggers import Proximity, Trigger
+from cavsumo.bodies import Action
 from cavsumo.checks import choice, number
 from cavsumo.scene import Scene
 from cavsumo.snapshot import BodyState, Snapshot
 
-IDLE_DOC = "before crossing: walk along the 'pavement', wait at the 'kerb', or 'noop'"
-
-
-class Idle(Protocol):
-    """What a body does while its behaviour is inactive."""
-
-    def action(self, state: BodyState) -> Action: ...
-
-
-class DoNothing:
-    """The seed's noop."""
-
-    def action(self, state: BodyState) -> Action:
-        return NOOP
-
-
-def idling(name: str, scene: Scene, index: int) -> Idle:
-    """The idle behaviour of that name for a body."""
-    if name == "pavement":
-        return Stroll(scene, index)
-    if name == "kerb":
-        return ApproachKerb(scene, index)
-    return DoNothing()
+IDLE_DOC = (
+    "before crossing: walk along the 'pavement', wait at the 'kerb', or 'noop'; vehicles drive "
+    "lawfully, or 'noop'"
+)
+MANOEUVRE_DOC = (
+    "of vehicles: 'run' across the ego's way, 'brake' ahead of it, 'cut-in' from the lane beside; "
+    "'auto' by where they start"
+)
 
 
 class ProgrammedAgent(Agent):
-    """Crosses the road when ``starts`` says so; the frame of Algorithms 3 to 5."""
+    """Begins its behaviour when ``starts`` says so; the frame of Algorithms 3 to 5."""
 
     sees_background = False
 
-    def __init__(self, idle: str) -> None:
+    def __init__(self, idle: str, manoeuvre: str = "auto") -> None:
         self.idle = choice("idle", idle, ("pavement", "kerb", "noop"))
+        self.manoeuvre = choice("manoeuvre", manoeuvre, MANOEUVRES)
 
     def reset(self, scene: Scene, owned: Sequence[int], rng: np.random.Generator) -> None:
         super().reset(scene, owned, rng)
-        self.crossings = [CrossingWalk(scene) for _ in owned]
-        self._idles = [idling(self.idle, scene, i) for i in owned]
+        self.behaviours = [behaviour(scene, i, self.idle, self.manoeuvre) for i in owned]
 
     def starts(self, i: int, snapshot: Snapshot, state: BodyState) -> bool:
         """Whether the behaviour of the i-th owned body begins now."""
@@ -67,12 +54,10 @@ class ProgrammedAgent(Agent):
         return tuple([self._choose(i, snapshot, testers[j]) for i, j in enumerate(self.owned)])
 
     def _choose(self, i: int, snapshot: Snapshot, state: BodyState) -> Action:
-        crossing = self.crossings[i]
-        if crossing.crossing is None:
-            if not (self.starts(i, snapshot, state) and crossing.begin(state)):
-                return self._idles[i].action(state)
-            self._idles[i] = DoNothing()  # beyond the road nothing of the start holds
-        return crossing.action(state)
+        programmed = self.behaviours[i]
+        if programmed.active or (self.starts(i, snapshot, state) and programmed.begin(state)):
+            return programmed.act(snapshot, state)
+        return programmed.idle(snapshot, state)
 
 
 @AGENTS.register("programmed-random")
@@ -83,12 +68,17 @@ class ProgrammedRandomAgent(ProgrammedAgent):
         "rate_per_s": RATE_DOC,
         "epsilon": EPSILON_DOC,
         "idle": IDLE_DOC,
+        "manoeuvre": MANOEUVRE_DOC,
     }
 
     def __init__(
-        self, rate_per_s: float = 0.6, epsilon: float | None = None, idle: str = "pavement"
+        self,
+        rate_per_s: float = 0.6,
+        epsilon: float | None = None,
+        idle: str = "pavement",
+        manoeuvre: str = "auto",
     ) -> None:
-        super().__init__(idle)
+        super().__init__(idle, manoeuvre)
         self.exploration = Exploration(rate_per_s, epsilon)
 
     def starts(self, i: int, snapshot: Snapshot, state: BodyState) -> bool:
@@ -117,10 +107,13 @@ class ProximityAgent(ProgrammedReactiveAgent):
     PARAMETERS: ClassVar[Mapping[str, str]] = {
         "distance_m": "trigger: distance between the centres of body and ego [m]",
         "idle": IDLE_DOC,
+        "manoeuvre": MANOEUVRE_DOC,
     }
 
-    def __init__(self, distance_m: float = 34.0, idle: str = "pavement") -> None:
-        super().__init__(idle)
+    def __init__(
+        self, distance_m: float = 34.0, idle: str = "pavement", manoeuvre: str = "auto"
+    ) -> None:
+        super().__init__(idle, manoeuvre)
         self.distance_m = number("distance_m", distance_m, 0.0)
 
     def trigger(self, scene: Scene, index: int) -> Trigger:
@@ -134,11 +127,12 @@ class TimingAgent(ProgrammedReactiveAgent):
     PARAMETERS: ClassVar[Mapping[str, str]] = {
         "aim": "part of the reaction zone to step into, [0.3..1]: 1 its far end, 0 its near end",
         "idle": IDLE_DOC,
+        "manoeuvre": MANOEUVRE_DOC,
     }
 
-    def __init__(self, aim: float = 0.5, idle: str = "kerb") -> None:
-        super().__init__(idle)
+    def __init__(self, aim: float = 0.5, idle: str = "kerb", manoeuvre: str = "auto") -> None:
+        super().__init__(idle, manoeuvre)
         self.aim = number("aim", aim, 0.3, 1.0)
 
     def trigger(self, scene: Scene, index: int) -> Trigger:
-        return Timing(scene, index, self.aim)
+        return self.behaviours[self.owned.index(index)].timing(self.aim)

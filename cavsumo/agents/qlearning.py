@@ -33,6 +33,7 @@ class QLearningAgent(Agent):
     """Algorithm 6: learns from episode to episode which walking targets lead to tests."""
 
     sees_background = False
+    drives = False
 
     PARAMETERS: ClassVar[Mapping[str, str]] = {
         "alpha": "learning rate in the first episode (0..1]",

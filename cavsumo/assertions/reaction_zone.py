@@ -6,6 +6,11 @@ the tester is the precondition of an assertion.
 The precondition is that a tester's body enters the ego's reaction zone before it touches the
 braking zone or the ego: late enough to be hard, early enough for a vehicle that brakes at once.
 A body that touches the braking zone or the ego first makes the episode unfair.
+
+Vehicles among the testers count by where they will be and only in the ego's way (``fairness``): one
+that is followed at an ordinary distance is in no zone until it brakes, one beside in its own lane
+never. A vehicle that drives into the ego's side or rear after the trigger makes the episode
+unfair: no ego could have done anything about it.
 """
 
 from __future__ import annotations
@@ -23,9 +28,11 @@ from cavsumo.assertions.base import (
     Assertion,
     Judgement,
 )
+from cavsumo.bodies import WALKING
 from cavsumo.checks import number
 from cavsumo.contacts import STANDING_MPS, Contact
-from cavsumo.geometry import TOUCH, in_frame, zone_entered
+from cavsumo.fairness import counted, drives_clear, is_vehicle, out_of_the_way, ran_into
+from cavsumo.geometry import TOUCH, Box, in_frame, overlap, zone_entered
 from cavsumo.scene import Scene
 from cavsumo.snapshot import BodyState, Snapshot
 
@@ -45,7 +52,8 @@ class ReactionZoneAssertion(Assertion):
     PARAMETERS: ClassVar[Mapping[str, str]] = {
         "max_decel": "the deceleration that the zones assume [m/s2]",
         "reaction_time": "the reaction time that the zones assume [s]",
-        "clear_s": "how long the ego must stand clear for the verdict held [s]",
+        "clear_s": "how long the ego must stand clear, or a vehicle ahead drive clear, for the "
+        "verdict held [s]",
     }
 
     def __init__(
@@ -59,6 +67,9 @@ class ReactionZoneAssertion(Assertion):
         super().reset(scene)
         self._body: int | None = None
         self._standing_since: float | None = None
+        self._clear_since: float | None = None
+        vehicles = [body.kind.v_max for body in scene.bodies if body.kind.name not in WALKING]
+        self._oncoming = max(vehicles, default=0.0)  # the fastest that one can come [m/s]
 
     def observe(self, snapshot: Snapshot, contacts: Sequence[Contact]) -> None:
         if self.decided:
@@ -95,17 +106,35 @@ class ReactionZoneAssertion(Assertion):
     def _far(self, ego: BodyState) -> float:
         """No zone, arcs included, leads farther from the ego's centre than this [m]."""
         braking = 0.5 * ego.v * ego.v / self.max_decel
-        return ego.body.kind.reach + braking + self.reaction_time * ego.v
+        drift = self._oncoming * ego.v / self.max_decel
+        return ego.body.kind.reach + braking + self.reaction_time * ego.v + drift
 
     def _zone(self, snapshot: Snapshot, tester: BodyState) -> str | None:
         """The zone that a body touches."""
         ego = snapshot.ego
+        if is_vehicle(tester):
+            return self._vehicle_zone(snapshot, tester)
         if not snapshot.ego_steering:  # the zones are no wider than the ego
             across = (tester.y - ego.y) * math.cos(ego.o) - (tester.x - ego.x) * math.sin(ego.o)
             if abs(across) > ego.body.kind.width / 2 + tester.body.kind.reach + TOUCH:
                 return None
+        return self._touched(snapshot, tester.box)
+
+    def _vehicle_zone(self, snapshot: Snapshot, tester: BodyState) -> str | None:
+        """The zone in which a vehicle counts; touching the ego it counts where it is."""
+        ego = snapshot.ego
+        if overlap(ego.box, tester.box):
+            return "body"
+        zone = self._touched(snapshot, counted(tester, ego, self.max_decel))
+        if zone is None or out_of_the_way(tester, ego, self.scene.ego_path):
+            return None
+        return "braking" if zone == "body" else zone
+
+    def _touched(self, snapshot: Snapshot, box: Box) -> str | None:
+        """The zone that a box touches."""
+        ego = snapshot.ego
         return zone_entered(
-            tester.box,
+            box,
             ego.box,
             ego.v,
             max_decel=self.max_decel,
@@ -130,7 +159,12 @@ class ReactionZoneAssertion(Assertion):
         """Wait for the contact, or until the ego has passed or stands clear."""
         ego = snapshot.ego
         hit = next((c for c in contacts if c.a is ego and c.b.id == body.id), None)
-        if hit is not None and ego.v > STANDING_MPS:
+        if hit is not None and is_vehicle(body) and ran_into(body, ego, self.scene.dt):
+            self.judgement = dataclasses.replace(
+                self.judgement, verdict=UNFAIR, trigger_time=None, ego_speed=ego.v
+            )
+            self._decide()
+        elif hit is not None and ego.v > STANDING_MPS:
             self.judgement = dataclasses.replace(
                 self.judgement,
                 verdict=VIOLATED,
@@ -139,7 +173,12 @@ class ReactionZoneAssertion(Assertion):
                 impact_speed=hit.closing_speed,
             )
             self._decide()
-        elif self._passed(ego, body) or self._left(snapshot, body) or self._stands_clear(snapshot):
+        elif (
+            self._passed(ego, body)
+            or self._left(snapshot, body)
+            or self._stands_clear(snapshot)
+            or (is_vehicle(body) and self._drives_clear(snapshot, body))
+        ):
             self._decide()
 
     def _decide(self) -> None:
@@ -157,6 +196,15 @@ class ReactionZoneAssertion(Assertion):
         planned = self.scene.ego_path.project(body.x, body.y).lateral
         room = min(abs(ahead), abs(planned)) - body.body.kind.reach - ego.body.kind.width / 2
         return room > BESIDE_M and self._zone(snapshot, body) is None
+
+    def _drives_clear(self, snapshot: Snapshot, body: BodyState) -> bool:
+        """Whether a vehicle has been ahead of the zones and no slower than the ego long enough."""
+        if not drives_clear(body, snapshot.ego) or self._zone(snapshot, body) is not None:
+            self._clear_since = None
+            return False
+        if self._clear_since is None:
+            self._clear_since = snapshot.time
+        return snapshot.time - self._clear_since >= self.clear_s - 1e-9
 
     def _stands_clear(self, snapshot: Snapshot) -> bool:
         """Whether the ego has been standing for long enough."""

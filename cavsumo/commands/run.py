@@ -9,7 +9,6 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from cavsumo.bodies import WALKING
 from cavsumo.egos import make_ego
 from cavsumo.errors import CavsumoError, Exit, InputError, ResultsError
 from cavsumo.executors import Means, opened
@@ -49,7 +48,6 @@ def run(settings: Mapping[str, Any], output: Path, means: Means, manner: Manner)
     recorded = _recorded(output, manner)
     plan = plan_from({**_settings_of(recorded), **settings}, "run")
     setting = prepare(plan)
-    _check_kind(plan.scenario.kind)
     now = manifest(setting)
     _check_same(output, recorded, now)
     with opened(means) as (executor, jobs), Interrupts(manner.quiet) as interrupts:
@@ -115,14 +113,6 @@ def _check_output(output: Path) -> None:
         raise InputError(f"output {str(output)!r}: expected a name that ends in .csv")
     if output.is_dir() or output.with_suffix("").is_file():
         raise InputError(f"output {str(output)!r}: its place is taken")
-
-
-def _check_kind(kind: str) -> None:
-    """Refuse testers that could not start anywhere."""
-    if kind not in WALKING:
-        raise InputError(
-            f"kind {kind!r}: testers start on pavements, where only {' and '.join(WALKING)} can be"
-        )
 
 
 def _recorded(output: Path, manner: Manner) -> dict[str, Any] | None:

@@ -1,0 +1,92 @@
+"""The programmed behaviour of one body, walking or driving; which of them, its start says.
+
+A behaviour idles until it is begun, is active for a while, and idles again.
+"""
+
+from __future__ import annotations
+
+from typing import Protocol
+
+from cavsumo.agents.manoeuvres import Driver
+from cavsumo.agents.triggers import Timing, Trigger
+from cavsumo.agents.walking import ApproachKerb, CrossingWalk, Stroll
+from cavsumo.bodies import NOOP, Action
+from cavsumo.scene import Scene
+from cavsumo.snapshot import BodyState, Snapshot
+
+
+class Behaviour(Protocol):
+    """What a programmed body does before, while and after it is active."""
+
+    @property
+    def active(self) -> bool:
+        """Whether the behaviour is under way."""
+
+    def idle(self, snapshot: Snapshot, state: BodyState) -> Action:
+        """The next action while it is not."""
+
+    def begin(self, state: BodyState) -> bool:
+        """Begin here and now; False where that is impossible."""
+
+    def act(self, snapshot: Snapshot, state: BodyState) -> Action:
+        """The next action while active; ends the behaviour when it is done."""
+
+    def timing(self, aim: float) -> Trigger:
+        """The trigger that begins it as the ego's reaction zone arrives."""
+
+
+def behaviour(scene: Scene, index: int, idle: str, manoeuvre: str) -> Behaviour:
+    """The behaviour of a body, by how it started."""
+    if scene.starts[index].approach is None:
+        return Walker(scene, index, idle)
+    return Driver(scene, index, idle, manoeuvre)
+
+
+class Idle(Protocol):
+    """What a walker does while its behaviour is inactive."""
+
+    def action(self, state: BodyState) -> Action: ...
+
+
+class DoNothing:
+    """The seed's noop."""
+
+    def action(self, state: BodyState) -> Action:
+        return NOOP
+
+
+def idling(name: str, scene: Scene, index: int) -> Idle:
+    """The idle behaviour of that name for a walker."""
+    if name == "pavement":
+        return Stroll(scene, index)
+    if name == "kerb":
+        return ApproachKerb(scene, index)
+    return DoNothing()
+
+
+class Walker:
+    """Crosses the road."""
+
+    def __init__(self, scene: Scene, index: int, idle: str) -> None:
+        self.scene, self.index = scene, index
+        self._crossing = CrossingWalk(scene)
+        self._idle = idling(idle, scene, index)
+
+    @property
+    def active(self) -> bool:
+        return self._crossing.crossing is not None
+
+    def idle(self, snapshot: Snapshot, state: BodyState) -> Action:
+        return self._idle.action(state)
+
+    def begin(self, state: BodyState) -> bool:
+        if not self._crossing.begin(state):
+            return False
+        self._idle = DoNothing()  # beyond the road nothing of the start holds
+        return True
+
+    def act(self, snapshot: Snapshot, state: BodyState) -> Action:
+        return self._crossing.action(state)
+
+    def timing(self, aim: float) -> Trigger:
+        return Timing(self.scene, self.index, aim)

@@ -1,0 +1,286 @@
+"""What a programmed vehicle does: lawful until it is triggered, then its manoeuvre.
+
+Lawful: it follows its lanes, keeps its distance to everybody and waits where its way meets the
+ego's: for good, unless it is triggered. It takes its time to get there, so as to be still rolling
+when the ego comes. On the ego's lane and beside it, it keeps the speed with which it started.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping
+from typing import ClassVar
+
+from cavsumo.agents.driving import HASTE_MPS2, RUN_OUT_M, Course, stopping_from
+from cavsumo.agents.triggers import MARGIN, MAX_DECEL, REACTION_TIME, Trigger
+from cavsumo.bodies import NOOP, Action
+from cavsumo.fairness import drift
+from cavsumo.roads import Approach
+from cavsumo.scene import Scene
+from cavsumo.snapshot import BodyState, Snapshot
+
+MANOEUVRES = ("auto", "run", "brake", "cut-in")
+CREEPING_MPS = 2.0  # a lawful vehicle goes no slower than this to where it waits
+STANDS_S = 3.0  # one that braked drives on after this time
+NOTICE_S = 0.7  # an ego that follows is taken to notice a brake light after this time
+STANDING_M = 2.5  # and to come to a stand so far behind
+CUT_IN_LOOK_M = 7.0  # how gently it changes lanes: the distance of the point pursued
+SLOWED = 0.7  # speed after cutting in, as a share of the one before
+STOPPING_M = 30.0  # so far before the end of its way it minds that again
+ARRIVED_M = 0.3  # so near the axis of a lane one is on it
+MOVING_OFF = 0.7  # an ego slower than this share of its speed limit that gains speed moves off
+FAR_M = 30.0  # a run that leads into the ego's lane has ended after this
+
+
+class Forecast:
+    """Where the ego will be: at the speed that it has, or gaining speed while it moves off."""
+
+    def __init__(self, scene: Scene, limit: float) -> None:
+        self.scene, self.limit = scene, limit
+        self.front = self.v = self.gaining = 0.0
+        self._seen = -1
+
+    def see(self, snapshot: Snapshot) -> None:
+        """Take in a snapshot."""
+        v, self._seen, before = snapshot.ego.v, snapshot.step, self._seen
+        gained = (v - self.v) / self.scene.dt if snapshot.step - before == 1 else 0.0
+        self.gaining = gained if v < MOVING_OFF * self.limit and gained > 0.0 else 0.0
+        self.front, self.v = self.scene.ego_progress(snapshot) + self.scene.ego.kind.length / 2, v
+
+    def after(self, time: float) -> tuple[float, float]:
+        """Arc length of its front on its path, and its speed, after a time [m, m/s]."""
+        if not self.gaining:
+            return self.front + self.v * time, self.v
+        gaining = min(time, (self.limit - self.v) / self.gaining)
+        v = self.v + self.gaining * gaining
+        return self.front + (self.v + v) / 2 * gaining + v * (time - gaining), v
+
+
+class Manoeuvre:
+    """One manoeuvre of one vehicle.
+
+    Attributes:
+        course: what the vehicle drives along, before or after.
+    """
+
+    types: ClassVar[tuple[str, ...]]  # of approach on which it is possible
+
+    def __init__(self, scene: Scene, approach: Approach, course: Course) -> None:
+        self.scene, self.approach, self.course = scene, approach, course
+
+    def possible(self, state: BodyState) -> bool:
+        """Whether it can still begin."""
+        return True
+
+    def begin(self, state: BodyState) -> None:
+        """Begin."""
+
+    def act(self, state: BodyState, others: Iterator[BodyState]) -> Action:
+        """The next action; ``others`` are all but the ego."""
+        raise NotImplementedError
+
+    def over(self, state: BodyState) -> bool:
+        """Whether it has ended, and the vehicle drives lawfully on."""
+        return False
+
+    def gap(self, ego: Forecast, state: BodyState) -> tuple[float, float] | None:
+        """Room that an ego which drives on has left on meeting a vehicle that begins now [m].
+
+        With it the ego's speed then [m/s]. Measured as the stopping zones count vehicles
+        (``fairness``). None when they will not meet.
+        """
+        raise NotImplementedError
+
+
+class Run(Manoeuvre):
+    """Drives on across or into the ego's way, whatever light or sign it has, and whoever comes."""
+
+    types = ("crossing", "merging")
+
+    def possible(self, state: BodyState) -> bool:
+        return self.course.place(state)[0] < self.approach.enter
+
+    def act(self, state: BodyState, others: Iterator[BodyState]) -> Action:
+        allowed = self.course.room(state, others)
+        return self.course.drive(state, allowed, gaining=HASTE_MPS2)
+
+    def over(self, state: BodyState) -> bool:
+        end = min(self.approach.leave, self.approach.enter + FAR_M)
+        return self.course.place(state)[0] > end
+
+    def gap(self, ego: Forecast, state: BodyState) -> tuple[float, float] | None:
+        if not self.possible(state):
+            return None
+        approach, path = self.approach, self.scene.ego_path
+        time, v = self.course.time_to(state, approach.enter)
+        turn = self.course.path.at(approach.enter)[2] - path.at(approach.ego_enter)[2]
+        front, ego_v = ego.after(time + self.scene.dt)
+        return approach.ego_enter - front + drift(v * math.cos(turn), ego_v, MAX_DECEL), ego_v
+
+
+class Brake(Manoeuvre):
+    """Brakes as hard as it can, and stands for a while."""
+
+    types = ("following",)
+    standing = 0.0  # for how long [s]
+
+    def act(self, state: BodyState, others: Iterator[BodyState]) -> Action:
+        if state.v <= 0.0:
+            self.standing += self.scene.dt
+        return Action(state.body.kind.throttle_min, self.course.steering(state))
+
+    def over(self, state: BodyState) -> bool:
+        return self.standing > STANDS_S
+
+    def gap(self, ego: Forecast, state: BodyState) -> tuple[float, float] | None:
+        rear = self.course.place(state)[0] - state.body.kind.length / 2
+        front, ego_v = ego.after(NOTICE_S)
+        return rear + drift(state.v, ego_v, MAX_DECEL) - front - STANDING_M, ego_v
+
+
+class CutIn(Manoeuvre):
+    """Changes into the ego's lane and slows down."""
+
+    types = ("adjacent",)
+
+    def begin(self, state: BodyState) -> None:
+        assert self.approach.into is not None
+        kind, top = state.body.kind, max(state.v, CREEPING_MPS)
+        self.course = Course(self.approach.into, kind, self.scene.dt, top)
+        self.slowed = SLOWED * top
+        self.arrived = False
+
+    def act(self, state: BodyState, others: Iterator[BodyState]) -> Action:
+        self.arrived = self.arrived or abs(self.course.place(state)[1]) < ARRIVED_M
+        allowed = self.course.room(state, others)
+        if self.arrived:
+            return self.course.drive(state, min(allowed, self.slowed))
+        return self.course.drive(state, allowed, look=CUT_IN_LOOK_M)
+
+    def over(self, state: BodyState) -> bool:
+        end = self.course.path.length - STOPPING_M
+        return self.arrived and self.course.place(state)[0] > end
+
+    def gap(self, ego: Forecast, state: BodyState) -> tuple[float, float] | None:
+        here = self.scene.ego_path.project(state.x, state.y)
+        kind = state.body.kind
+        if state.v <= 0.0 or not 0.0 < here.along < self.scene.ego_path.length:
+            return None
+        # Pursuing a point at the distance L on a line, a body closes in on it as exp(-way / L).
+        strips = (kind.width + self.scene.ego.kind.width) / 2
+        time = CUT_IN_LOOK_M * math.log(max(1.0, abs(here.lateral) / strips)) / state.v
+        rear = here.along - kind.length / 2 + state.v * time
+        front, ego_v = ego.after(time)
+        return rear + drift(state.v, ego_v, MAX_DECEL) - front, ego_v
+
+
+KNOWN: Mapping[str, type[Manoeuvre]] = {"run": Run, "brake": Brake, "cut-in": CutIn}
+
+
+def manoeuvre_on(name: str, type_: str) -> type[Manoeuvre] | None:
+    """The manoeuvre of a name on a type of approach; "auto" is the one that is possible there."""
+    for known, manoeuvre in KNOWN.items():
+        if name in ("auto", known) and type_ in manoeuvre.types:
+            return manoeuvre
+    return None
+
+
+def types_for(name: str) -> tuple[str, ...]:
+    """The types of approach on which a manoeuvre is possible; none in particular for "auto"."""
+    return () if name == "auto" else KNOWN[name].types
+
+
+class Driver:
+    """The behaviour of a programmed vehicle (``behaviours.Behaviour``).
+
+    Args:
+        idle: "noop" does nothing until it is triggered; anything else drives lawfully.
+        name: one of MANOEUVRES. A vehicle on an approach on which that is impossible drives
+            lawfully throughout.
+    """
+
+    def __init__(self, scene: Scene, index: int, idle: str, name: str) -> None:
+        approach = scene.starts[index].approach
+        assert approach is not None
+        self.scene, self.approach, self._noop = scene, approach, idle == "noop"
+        kind = scene.bodies[index].kind
+        waits = math.isfinite(approach.wait)
+        top = approach.speed if waits else scene.starts[index].v or approach.speed
+        self.course = Course(approach.path, kind, scene.dt, top)
+        chosen = manoeuvre_on(name, approach.type)
+        self.manoeuvre = chosen(scene, approach, self.course) if chosen else None
+        self.active = self._begun = False
+        # Beyond the end of a road nobody in SUMO sees a body. There it is out of the way of all but
+        # those behind it, so who drives ahead of the ego stops before.
+        self._run_out = RUN_OUT_M if waits else -kind.length / 2
+
+    def idle(self, snapshot: Snapshot, state: BodyState) -> Action:
+        """Drive lawfully, or do nothing before it begins."""
+        if self._noop and not self._begun:
+            return NOOP
+        here, dt = self.course.place(state)[0], self.scene.dt
+        left = self.course.path.length + self._run_out - here - state.v * dt
+        allowed = self.course.room(state, everybody(snapshot, state))
+        if not self._begun and here < self.approach.enter:
+            left = min(left, self.approach.wait - here - state.v * dt)
+            allowed = min(allowed, self._unhurried(snapshot, here))
+        return self.course.drive(state, min(allowed, stopping_from(left, 0.0, dt)))
+
+    def _unhurried(self, snapshot: Snapshot, here: float) -> float:
+        """The speed that leads to the ego's way no sooner than the ego to it [m/s]."""
+        ego = snapshot.ego
+        way = self.approach.ego_enter - self.scene.ego_progress(snapshot) - ego.body.kind.length / 2
+        if way <= 0.0 or ego.v <= CREEPING_MPS:
+            return CREEPING_MPS
+        return max(CREEPING_MPS, (self.approach.enter - here) * ego.v / way)
+
+    def begin(self, state: BodyState) -> bool:
+        """Begin the manoeuvre; False when there is none, or it is too late, or it has been."""
+        if self.manoeuvre is None or self._begun or not self.manoeuvre.possible(state):
+            return False
+        self.manoeuvre.begin(state)
+        self.course = self.manoeuvre.course  # cutting in leads to another
+        self.active = self._begun = True
+        return True
+
+    def act(self, snapshot: Snapshot, state: BodyState) -> Action:
+        """The next action of the manoeuvre."""
+        assert self.manoeuvre is not None
+        if self.manoeuvre.over(state):
+            self.active = False
+            return self.idle(snapshot, state)
+        return self.manoeuvre.act(state, everybody(snapshot, state, ego=False))
+
+    def timing(self, aim: float) -> Trigger:
+        """The trigger that times the manoeuvre by the ego's arrival."""
+        return Arrival(self, aim)
+
+
+class Arrival:
+    """Holds when a vehicle that begins now meets the ego as its reaction zone arrives there.
+
+    See ``triggers.Timing`` for the part ``aim``.
+    """
+
+    def __init__(self, driver: Driver, aim: float) -> None:
+        self.driver, self.aim = driver, aim
+        self.ego = Forecast(driver.scene, driver.approach.ego_speed)
+
+    def __call__(self, snapshot: Snapshot, state: BodyState) -> bool:
+        if self.driver.manoeuvre is None:
+            return False
+        self.ego.see(snapshot)
+        meeting = self.driver.manoeuvre.gap(self.ego, state)
+        if meeting is None:
+            return False
+        gap, v = meeting
+        braking, reaction = 0.5 * v * v / MAX_DECEL, REACTION_TIME * v
+        return braking + MARGIN * reaction < gap <= braking + self.aim * reaction
+
+
+def everybody(snapshot: Snapshot, but: BodyState, *, ego: bool = True) -> Iterator[BodyState]:
+    """All bodies but one, the ego among them if wanted."""
+    yield from (other for other in snapshot.testers if other is not but)
+    yield from map(BodyState._make, snapshot.raw_background)
+    if ego:
+        yield snapshot.ego
