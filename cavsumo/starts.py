@@ -49,7 +49,7 @@ def starting_areas(network: Network, roads: Roads, ego_path: Path) -> tuple[Star
     if not pavements:
         raise NetworkError(
             f"{network.file}: has no pavements for pedestrians to start on; rebuild it with "
-            "netconvert --sidewalks.guess --crossings.guess"
+            "netconvert --sidewalks.guess --crossings.guess, or test with vehicles (--kind car)"
         )
     line = LineString(ego_path.points)
     areas = [

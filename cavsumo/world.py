@@ -106,6 +106,7 @@ class World:
         self._driven: BodyState | None = None
         self._told: dict[str, tuple[BodyState, tuple[float, float, float]]] = {}
         self._step, self._steering = 0, 0.0
+        self._vehicles: tuple[str, ...] = ()
         with self._listening():
             self._begin(seed, simulation)
             self._insert(states, starts)

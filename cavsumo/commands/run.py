@@ -156,9 +156,10 @@ def _first_line(setting: Setting, jobs: int) -> str:
     where = f" junction {route.junction}" if route.junction else ""
     routes = scenario.routes.name if scenario.routes else "none"
     shard = f", shard {plan.shard}" if plan.shard else ""
+    bodies = "buses" if scenario.kind == "bus" else f"{scenario.kind}s"
     at_a_time = f", {jobs} at a time" if jobs > 1 else ""
     return (
-        f"cavsumo: agent {' '.join(plan.agents)}, {scenario.testers} {scenario.kind}s, "
+        f"cavsumo: agent {' '.join(plan.agents)}, {scenario.testers} {bodies}, "
         f"ego {driver}, network {scenario.name}{where}, traffic {routes}, "
         f"seed {plan.seed}, {plan.runs} episodes an agent{shard}{at_a_time}"
     )
