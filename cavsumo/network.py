@@ -114,8 +114,11 @@ class Network:
         return Roads(closed.simplify(0.01), [LineString(lane_shape(lane)) for lane in driving])
 
 
-def read_network(file: FilePath) -> Network:
-    """Read a .net.xml or .net.xml.gz; raises NetworkError in one sentence when it is none."""
+def read_network(file: FilePath, *, foes: bool = False) -> Network:
+    """Read a .net.xml or .net.xml.gz; raises NetworkError in one sentence when it is none.
+
+    ``foes``: with the tables of who gives way to whom, which take long on large networks.
+    """
     if file.is_dir():
         raise NetworkError(f"network {str(file)!r}: is a folder, expected a .net.xml")
     if not file.is_file():
@@ -127,7 +130,7 @@ def read_network(file: FilePath) -> Network:
             withInternal=True,
             withPedestrianConnections=True,
             withPrograms=True,
-            withFoes=False,
+            withFoes=foes,
             lxml=False,
         )
     except (xml.sax.SAXParseException, EOFError, zlib.error) as error:

@@ -98,7 +98,7 @@ def derive_site(
     ``ego_route`` are edges, or one word for a turn. Raises InputError (UnknownName, NetworkError)
     in one sentence.
     """
-    network = read_network(net)
+    network = read_network(net, foes=wishes.kind.name not in WALKING)
     try:
         return _derived(network, ego_route, junction, ego, wishes)
     except ValueError as error:  # shapes without points, widths that are none

@@ -56,8 +56,8 @@ def starting_areas(
     if next(network.pavements(), None) is None:
         raise NetworkError(
             f"{network.file}: has no pavements for pedestrians to start on; rebuild it with "
-            "netconvert --sidewalks.guess --crossings.guess, or let them start beside the road "
-            "with --jaywalk"
+            "netconvert --sidewalks.guess --crossings.guess, let them start beside the road with "
+            "--jaywalk, or test with vehicles (--kind car)"
         )
     line = LineString(ego_path.points)
     near = network.pavements_near(line, NEAR_M)

@@ -103,6 +103,7 @@ class World:
         self._told: dict[str, tuple[BodyState, tuple[float, float, float]]] = {}
         self._vehicles: tuple[str, ...] = ()
         self._step, self._steering = 0, 0.0
+        self._vehicles: tuple[str, ...] = ()
         with self._listening():
             self.simulations.begin(seed, simulation)
             self._insert(states, starts)

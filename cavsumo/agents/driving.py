@@ -28,8 +28,8 @@ GAINING_MPS2 = 2.5  # throttle of a calm driver
 BRAKING_MPS2 = 3.0  # its brake, where it sees the reason in time
 HARDEST_MPS2 = 9.0  # brake that others are taken to have
 HASTE_MPS2 = 4.0  # throttle of one who must get through
-LOOK_S = 0.5  # the point pursued lies so far ahead, in seconds of the way
-NEAREST_LOOK = 0.8  # but no nearer than this many wheelbases
+LOOK_S = 0.4  # the point pursued lies so far ahead, in seconds of the way
+NEAREST_LOOK = 0.5  # but no nearer than this many wheelbases
 NEAREST_LOOK_M = 2.0
 SEEN_M = 40.0  # who is farther away is not looked at
 KEEP_M = 2.0  # gap kept to who stands ahead
@@ -71,8 +71,10 @@ class Course:
 
     def limit(self, along: float) -> float:
         """The speed at which the bends from here on can be driven, braking in time [m/s]."""
-        i = min(len(self._limits) - 1, max(0, math.ceil(along)))
-        return self._limits[i]
+        last = len(self._limits) - 1
+        i = min(last, max(0, int(along)))
+        v, w = self._limits[i], self._limits[min(last, i + 1)]
+        return math.sqrt(v * v + (w * w - v * v) * min(1.0, max(0.0, along - i)))
 
     def steering(self, state: BodyState, look: float = 0.0) -> float:
         """The steering angle towards the point pursued, at least ``look`` metres ahead [rad]."""

@@ -158,9 +158,10 @@ def _first_line(setting: Setting, jobs: int) -> str:
     if scenario.traffic is not None:
         routes = "{:g},{:g} per minute and km".format(*scenario.traffic)
     shard = f", shard {plan.shard}" if plan.shard else ""
+    bodies = "buses" if scenario.kind == "bus" else f"{scenario.kind}s"
     at_a_time = f", {jobs} at a time" if jobs > 1 else ""
     return (
-        f"cavsumo: agent {' '.join(plan.agents)}, {scenario.testers} {scenario.kind}s, "
+        f"cavsumo: agent {' '.join(plan.agents)}, {scenario.testers} {bodies}, "
         f"ego {driver}, network {scenario.name}{where}, traffic {routes}, "
         f"seed {plan.seed}, {plan.runs} episodes an agent{shard}{at_a_time}"
     )

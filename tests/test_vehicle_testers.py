@@ -1,0 +1,105 @@
+"""Tester vehicles against real SUMO: they meet the ego, drive lawfully, and are repeatable."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from cavsumo.errors import InputError
+from cavsumo.jobs import job
+from cavsumo.scenario import plan_from
+from cavsumo.setting import prepare
+from cavsumo.worker import Worker
+
+SetUp = Callable[..., Any]
+PROGRAMMED = ["timing", "proximity", "programmed-random", "election"]
+
+
+def rows(setting: Any) -> list[dict[str, Any]]:
+    """The rows of a batch."""
+    with Worker(setting) as worker:
+        return [worker.play(job(setting.plan, run))[0].row for run in setting.plan.todo()]
+
+
+@contextmanager
+def frames(setting: Any, run: int) -> Iterator[list[dict[str, Any]]]:
+    """The frames of one episode."""
+    with Worker(setting) as worker:
+        yield worker.play(job(setting.plan, run))[0].frames
+
+
+@pytest.mark.parametrize("name", ["crossing", "junction"])
+def test_programmed_vehicles_meet_the_ego(set_up: SetUp, name: str) -> None:
+    """With traffic, most episodes bring one within 10 m; nothing fails, nobody is teleported."""
+    found = rows(set_up(name, kind="car", agents=PROGRAMMED, runs=5, routes="auto", trace="none"))
+    assert len(found) == 20
+    assert all(row["outcome"] != "error" for row in found), found
+    assert sum(row["min_gap_m"] < 10.0 for row in found) >= 16
+    assert sum(row["teleports"] for row in found) == 0
+
+
+def test_timing_finds_tests(set_up: SetUp) -> None:
+    """At the crossing, of 20 episodes some are tests, and some of them fail SUMO's driver."""
+    found = rows(set_up("crossing", kind="car", runs=20, trace="none"))
+    outcomes = [row["outcome"] for row in found]
+    assert outcomes.count("held") + outcomes.count("violated") >= 4
+    assert outcomes.count("unfair") <= 8
+
+
+@pytest.mark.parametrize("kind", ["car", "bus", "bicycle"])
+def test_the_same_seed_gives_the_same_rows(set_up: SetUp, kind: str) -> None:
+    """Every kind, byte for byte but for the time that it took."""
+    setting = set_up("crossing", kind=kind, agents=["timing", "random", "noop"], runs=2)
+    first, second = rows(setting), rows(setting)
+    for row in (*first, *second):
+        row.pop("wall_s")
+    assert first == second
+    assert all(row["outcome"] != "error" for row in first)
+
+
+@pytest.mark.parametrize("types", [("crossing",), ("merging",)])
+def test_an_untriggered_vehicle_waits_for_good(set_up: SetUp, types: tuple[str, ...]) -> None:
+    """It comes to its line and stands there while the ego passes: no test, no contact."""
+    setting = set_up(
+        "crossing",
+        kind="car",
+        approaches=types,
+        agents=["proximity"],
+        params={"distance_m": 0.0},
+        runs=4,
+        testers=1,
+        trace="all",
+    )
+    for run in range(4):
+        with frames(setting, run) as seen:
+            (tester,) = seen[-1]["testers"].values()
+            assert tester[2] < 0.5
+    assert {row["outcome"] for row in rows(setting)} == {"not_triggered"}
+    assert sum(row["contacts"] for row in rows(setting)) == 0
+
+
+def test_a_leader_that_brakes_stops_the_ego(set_up: SetUp) -> None:
+    """On the straight road there is nothing but to drive ahead and brake; SUMO's driver copes."""
+    found = rows(set_up(kind="car", testers=1, runs=6, params={"manoeuvre": "brake"}))
+    assert all(row["min_gap_m"] < 10.0 for row in found)
+    assert all(row["max_decel_mps2"] > 2.0 for row in found)
+    assert sum(row["contacts"] for row in found) == 0
+
+
+def test_a_manoeuvre_that_is_impossible_here_is_refused(set_up: SetUp) -> None:
+    """Nobody can cut in where there is one lane."""
+    with pytest.raises(InputError, match="no adjacent way for a car"):
+        set_up("crossing", kind="car", params={"manoeuvre": "cut-in"})
+
+
+def test_learners_of_walking_are_given_no_vehicle(networks: dict[str, Path]) -> None:
+    """And walkers no approach: one sentence each."""
+    plan = {"net": networks["crossing"]}
+    with pytest.raises(InputError, match="agent q-learning can only walk"):
+        prepare(plan_from(plan | {"kind": "car", "agents": ["q-learning"]}, "test"))
+    with pytest.raises(InputError, match="only vehicles have approaches"):
+        prepare(plan_from(plan | {"approaches": ["crossing"]}, "test"))
