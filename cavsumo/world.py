@@ -101,7 +101,6 @@ class World:
         self.teleports = self.emergency_stops = 0
         self._driven: BodyState | None = None
         self._told: dict[str, tuple[BodyState, tuple[float, float, float]]] = {}
-        self._vehicles: tuple[str, ...] = ()
         self._step, self._steering = 0, 0.0
         self._vehicles: tuple[str, ...] = ()
         with self._listening():

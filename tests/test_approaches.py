@@ -14,7 +14,7 @@ import pytest
 
 from cavsumo.approaches import approaches
 from cavsumo.bodies import BICYCLE, BUS, CAR, KINDS, Kind
-from cavsumo.ego_routes import derived_route, given_route
+from cavsumo.ego_routes import derived_routes, given_route
 from cavsumo.egos.base import EGO_KIND
 from cavsumo.errors import NetworkError
 from cavsumo.geometry import Box, gap
@@ -83,8 +83,10 @@ def found_in(
     file: Path, edges: Sequence[str] = (), kind: Kind = CAR, wanted: Sequence[str] = ()
 ) -> tuple[Approach, ...]:
     """The approaches in a network file, to the route given or derived."""
-    network, half = read_network(file), EGO_KIND.length / 2
-    route = given_route(network, edges, half) if edges else derived_route(network, None, half)
+    network, half = read_network(file, foes=True), EGO_KIND.length / 2
+    route = (
+        given_route(network, edges, half) if edges else next(derived_routes(network, None, half))
+    )
     return approaches(network, route, EGO_KIND, kind, wanted)
 
 

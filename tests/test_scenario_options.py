@@ -158,7 +158,7 @@ def test_jaywalkers_find_failures_where_there_is_no_pavement(
 @pytest.mark.parametrize(
     ("settings", "words"),
     [
-        ({"kind": "car"}, "jaywalk: only pedestrian and bicycle start beside the road"),
+        ({"kind": "car"}, "jaywalk: only pedestrians start beside the road"),
         ({"embodiment": "person"}, "jaywalk: embodiment person needs a pavement"),
         ({"jaywalk": "perhaps"}, "jaywalk: Input should be a valid boolean"),
     ],
