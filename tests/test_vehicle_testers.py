@@ -94,7 +94,7 @@ def test_a_leader_that_brakes_stops_the_ego(set_up: SetUp) -> None:
 def test_at_the_end_of_its_way_a_vehicle_comes_to_rest(
     set_up: SetUp, types: tuple[str, ...]
 ) -> None:
-    """Ahead of the ego it stops on the road; who has left the road stops a little behind its end."""
+    """Ahead of the ego it stops on the road; who crossed its way stops behind the road's end."""
     setting = set_up(
         "pedestrians" if "following" in types else "crossing",
         kind="car",
