@@ -90,6 +90,29 @@ def test_a_leader_that_brakes_stops_the_ego(set_up: SetUp) -> None:
     assert sum(row["contacts"] for row in found) == 0
 
 
+@pytest.mark.parametrize("types", [("following",), ("merging",)])
+def test_at_the_end_of_its_way_a_vehicle_comes_to_rest(
+    set_up: SetUp, types: tuple[str, ...]
+) -> None:
+    """Ahead of the ego it stops on the road; who crossed its way stops behind the road's end."""
+    setting = set_up(
+        "pedestrians" if "following" in types else "crossing",
+        kind="car",
+        approaches=types,
+        testers=1,
+        agents=["programmed-random"],
+        params={"rate_per_s": 0.0 if "following" in types else 5.0},
+        ego="constant",
+        ego_params={"speed": 0.0},
+        trace="all",
+    )
+    with frames(setting, 0) as seen:
+        (tester,) = seen[-1]["testers"].values()
+        assert tester[2] < 0.1
+        inside = tester[0] + 2.25 <= 99.0
+        assert inside or "merging" in types
+
+
 def test_a_manoeuvre_that_is_impossible_here_is_refused(set_up: SetUp) -> None:
     """Nobody can cut in where there is one lane."""
     with pytest.raises(InputError, match="no adjacent way for a car"):

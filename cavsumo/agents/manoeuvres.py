@@ -26,6 +26,7 @@ NOTICE_S = 0.7  # an ego that follows is taken to notice a brake light after thi
 STANDING_M = 2.5  # and to come to a stand so far behind
 CUT_IN_LOOK_M = 7.0  # how gently it changes lanes: the distance of the point pursued
 SLOWED = 0.7  # speed after cutting in, as a share of the one before
+SQUEEZE_M = 20.0  # a lane beside the ego's that ends so soon after leaving it ends beside it
 STOPPING_M = 30.0  # so far before the end of its way it minds that again
 ARRIVED_M = 0.3  # so near the axis of a lane one is on it
 MOVING_OFF = 0.7  # an ego slower than this share of its speed limit that gains speed moves off
@@ -212,7 +213,11 @@ class Driver:
         self.active = self._begun = False
         # Beyond the end of a road nobody in SUMO sees a body. There it is out of the way of all but
         # those behind it, so who drives ahead of the ego stops before.
+        # So does who drives beside it: where its lane ends it may well be squeezed into the ego's.
         self._run_out = RUN_OUT_M if waits else -kind.length / 2
+        beside = not waits and math.isfinite(approach.leave)
+        if beside and approach.path.length - approach.leave < SQUEEZE_M:
+            self._run_out += approach.leave - approach.path.length
 
     def idle(self, snapshot: Snapshot, state: BodyState) -> Action:
         """Drive lawfully, or do nothing before it begins."""
