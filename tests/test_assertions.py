@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import assume, example, given, settings
 from hypothesis import strategies as st
 
 from cavsumo.agents.base import Scene
@@ -265,6 +265,7 @@ def test_an_ego_that_then_drives_into_him_fails() -> None:
 
 
 @settings(deadline=None)
+@example(9.703125, 3.40625)
 @given(st.floats(9.7, 40.0), st.floats(0.0, 9.0))
 def test_a_body_ahead_is_held_or_violated_as_the_ego_stops_short_or_not(
     x: float, decel: float
@@ -272,6 +273,8 @@ def test_a_body_ahead_is_held_or_violated_as_the_ego_stops_short_or_not(
     """An ego that brakes evenly for one who stands ahead fails exactly if it drives into him."""
     frames = drive([person(x)], 150, decel)
     front = max(state[0] for state, _ in frames) + CAR.length / 2
+    # Who creeps up to him with less than 0.1 m/s counts as standing: then it is neither.
+    assume(abs(front - (x - PEDESTRIAN.width / 2)) > 0.02)
     verdict = judged(frames).judgement.verdict
     if front >= x - PEDESTRIAN.width / 2:
         assert verdict == "violated"
