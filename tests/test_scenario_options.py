@@ -177,14 +177,7 @@ def test_who_cannot_jaywalk_is_refused(
     [["--ego-route", "lefft"], ["--ego-route", "u-turn"], ["--jaywalk", "--kind", "car"]],
 )
 def test_bad_options_are_one_sentence(
-    tmp_path: Path,
-    networks: dict[str, Path],
-    monkeypatch: pytest.MonkeyPatch,
-    capsys: pytest.CaptureFixture[str],
-    words: list[str],
+    refused: Callable[..., str], networks: dict[str, Path], words: list[str]
 ) -> None:
     """Exit status 2, nothing written."""
-    monkeypatch.chdir(tmp_path)
-    assert cli.main(["run", "--net", str(networks["junction"]), *words]) == 2
-    assert capsys.readouterr().err.count("\n") == 1
-    assert list(tmp_path.iterdir()) == []
+    refused("--net", str(networks["junction"]), *words)
