@@ -1,0 +1,80 @@
+"""What a group found, as shares with intervals."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from cavsumo.report.grouping import Group
+from cavsumo.statistics import Rate, rate, sequential_rate
+from cavsumo.tally import Found
+
+WILSON, EXACT, SEQUENTIAL = "Wilson", "Clopper-Pearson", "confidence sequence"
+
+
+@dataclass(frozen=True)
+class Share:
+    """A share of something, with its 95 % intervals by the names of the methods.
+
+    Attributes:
+        count, total: how many of how many.
+        of: of what.
+        intervals: by Wilson and by Clopper and Pearson; or, where the number of episodes may depend
+            on what they found, the confidence sequence alone, for the others would not hold.
+    """
+
+    count: int
+    total: int
+    of: str
+    intervals: Mapping[str, Rate]
+
+    @property
+    def value(self) -> float | None:
+        """The share, None of nothing."""
+        return self.count / self.total if self.total else None
+
+
+@dataclass(frozen=True)
+class Rates:
+    """The shares of one group.
+
+    Attributes:
+        setting, agent, value: whose.
+        episodes, errors: how many there are, how many could not be played.
+        tests, failures, unfair: of valid episodes, of tests, of valid episodes.
+    """
+
+    setting: str
+    agent: str
+    value: str
+    episodes: int
+    errors: int
+    tests: Share
+    failures: Share
+    unfair: Share
+
+
+def rates(group: Group) -> Rates:
+    """The shares of one group."""
+    found = Found(Counter(group.rows["outcome"]))
+    shares = {
+        "tests": (found.tests, found.valid, "valid episodes"),
+        "failures": (found.failures, found.tests, "tests"),
+        "unfair": (found.unfair, found.valid, "valid episodes"),
+    }
+    found_shares = {name: share(*of, sequential=group.sequential) for name, of in shares.items()}
+    return Rates(
+        **group.label,
+        episodes=found.episodes,
+        errors=found.errors,
+        **found_shares,
+    )
+
+
+def share(count: int, total: int, of: str, *, sequential: bool) -> Share:
+    """A share with the intervals that hold for it."""
+    if sequential:
+        return Share(count, total, of, {SEQUENTIAL: sequential_rate(count, total)})
+    both = {WILSON: rate(count, total), EXACT: rate(count, total, "exact")}
+    return Share(count, total, of, both)
