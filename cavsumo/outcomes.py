@@ -109,6 +109,7 @@ def frame(snapshot: Snapshot) -> dict[str, Any]:
         "steering": snapshot.ego_steering,
         "testers": {t.id: _pose(t) for t in snapshot.testers},
         "background": {b.id: _pose(b) for b in snapshot.background},
+        "lights": "".join(snapshot.lights),
     }
 
 

@@ -61,9 +61,9 @@ def first_difference(
 def _frame_differences(old: Mapping[str, Any], new: Mapping[str, Any]) -> Iterator[str]:
     """The differences of two frames, body by body."""
     step = f"step {old['step']} ({old['time_s']:.3f} s)"
-    for key in ("step", "time_s", "steering"):
-        if old[key] != new[key]:
-            yield f"{step}: {key} recorded {old[key]!r}, replayed {new[key]!r}"
+    for key in ("step", "time_s", "steering", "lights"):
+        if old.get(key) != new.get(key):
+            yield f"{step}: {key} recorded {old.get(key)!r}, replayed {new.get(key)!r}"
     old_bodies = {"ego": old["ego"], **old["testers"], **old["background"]}
     new_bodies = {"ego": new["ego"], **new["testers"], **new["background"]}
     for body in sorted(old_bodies.keys() ^ new_bodies.keys()):

@@ -16,6 +16,7 @@ from cavsumo.snapshot import BodyState, Snapshot
 GOAL = 100.0
 TIME_COST = 1.0  # per second and agent
 ROAD_COST = 1.0  # per second that a body's centre is on the carriageway
+Feedback = tuple[list[float], bool]  # each agent's reward for a timestep, and whether the game ends
 
 
 class Ledger:
@@ -37,9 +38,7 @@ class Ledger:
         self._seen: tuple[BodyState, ...] = ()
         self._waiting = [-self._dt * TIME_COST] * len(teams)  # with nobody on the road
 
-    def rewards(
-        self, successor: Snapshot, judgements: Sequence[Judgement]
-    ) -> tuple[list[float], bool] | None:
+    def rewards(self, successor: Snapshot, judgements: Sequence[Judgement]) -> Feedback | None:
         """Each agent's reward for a timestep and whether the game ends; None once it is over."""
         testers, on_road = successor.testers, self._on_road
         if testers is not self._seen:
@@ -66,7 +65,7 @@ class Ledger:
         self.total += sum(rewards)
         return rewards, self._over
 
-    def lost(self) -> tuple[list[float], bool] | None:
+    def lost(self) -> Feedback | None:
         """The last reward when the ego got away: a dead end for every agent."""
         if self._over:
             return None

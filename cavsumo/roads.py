@@ -8,6 +8,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from typing import NamedTuple
 
 import shapely
 from shapely.geometry import LineString, Point
@@ -47,6 +48,20 @@ class Crossing:
     def progress(self, x: float, y: float) -> float:
         """How far along the way a point is [m]."""
         return (x - self.x) * self._cos + (y - self.y) * self._sin
+
+
+class Light(NamedTuple):
+    """A traffic light on the ego's way.
+
+    Attributes:
+        id: of the traffic light in the network.
+        link: index of the ego's link in the letters that it shows.
+        along: arc length of the stop line on the ego's path [m].
+    """
+
+    id: str
+    link: int
+    along: float
 
 
 # How a vehicle's way lies to the ego's: across it, into its lane, on its lane ahead of it, in a

@@ -7,7 +7,7 @@ from typing import Any
 
 from cavsumo.bodies import Body
 from cavsumo.paths import Path, Projection
-from cavsumo.roads import Crossing, Roads, Start
+from cavsumo.roads import Crossing, Light, Roads, Start
 from cavsumo.snapshot import Snapshot
 
 
@@ -22,6 +22,8 @@ class Scene:
         bodies: the testers' bodies, in the order of ``Snapshot.testers``.
         starts: where each of them starts.
         roads: carriageways and the ways across them; None on an open plane.
+        lights: the traffic lights on the ego's path, in the order in which it meets them.
+        seed: of the episode; whoever draws random numbers without a generator starts from it.
     """
 
     dt: float
@@ -30,6 +32,8 @@ class Scene:
     bodies: tuple[Body, ...]
     starts: tuple[Start, ...]
     roads: Roads | None = None
+    lights: tuple[Light, ...] = ()
+    seed: int = 0
     _progress: list[Any] = field(default_factory=lambda: [None, None], repr=False)
     _ways: dict[int, Crossing | None] = field(default_factory=dict, repr=False)
 

@@ -6,7 +6,7 @@ Pure: the light's program and the ego's way come from the network; the world onl
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 from typing import Any, Literal
@@ -14,6 +14,7 @@ from typing import Any, Literal
 from cavsumo.ego_routes import EgoRoute, lanes_along
 from cavsumo.errors import NetworkError
 from cavsumo.network import Network
+from cavsumo.roads import Light
 
 Signal = Literal["any", "green", "red"]
 # SUMO's letters of a link; G comes before g, which gives way.
@@ -92,19 +93,39 @@ def light_start(network: Network, route: EgoRoute, signal: Signal, pace: Pace) -
     )
 
 
+def lights_along(network: Network, route: EgoRoute) -> tuple[Light, ...]:
+    """The traffic lights that the ego meets on its route, in this order."""
+    return tuple(
+        Light(
+            str(link.getTLSID()),
+            int(link.getTLLinkIndex()),
+            route.path.project(*lane.getShape()[-1]).along,
+        )
+        for lane, link in _links(network, route)
+        if link is not None and link.getTLSID()
+    )
+
+
 def first_light(network: Network, route: EgoRoute, signal: Signal) -> Approach:
     """The way to the first traffic light on the ego's route; raises NetworkError for none."""
+    legs: list[tuple[float, float]] = []
+    for lane, link in _links(network, route):
+        legs.append((float(lane.getLength()), float(lane.getSpeed())))
+        if link is not None and link.getTLSID():
+            legs[0] = (max(0.1, legs[0][0] - route.depart_m), legs[0][1])
+            return Approach(str(link.getTLSID()), int(link.getTLLinkIndex()), tuple(legs))
+    raise NetworkError(f"{network.file}: signal {signal}: the ego's route has no traffic light")
+
+
+def _links(network: Network, route: EgoRoute) -> Iterator[tuple[Any, Any]]:
+    """Each lane of a route with the link to the next one, None within a junction."""
     lanes = lanes_along(network, [network.edge(edge) for edge in route.edges])
     assert lanes is not None  # or it were no route
-    legs: list[tuple[float, float]] = []
     for lane, following in pairwise(lanes):
-        legs.append((float(lane.getLength()), float(lane.getSpeed())))
-        for link in lane.getOutgoing():
-            onto = link.getViaLaneID() or link.getToLane().getID()
-            if onto == following.getID() and link.getTLSID():
-                legs[0] = (max(0.1, legs[0][0] - route.depart_m), legs[0][1])
-                return Approach(str(link.getTLSID()), int(link.getTLLinkIndex()), tuple(legs))
-    raise NetworkError(f"{network.file}: signal {signal}: the ego's route has no traffic light")
+        onto = following.getID()
+        links = lane.getOutgoing()
+        joins = (k for k in links if onto == (k.getViaLaneID() or k.getToLane().getID()))
+        yield lane, next(joins, None)
 
 
 def arrival(legs: Sequence[tuple[float, float]], pace: Pace) -> float:

@@ -13,43 +13,20 @@ import numpy as np
 
 from cavsumo.agents.base import Agent
 from cavsumo.assertions.base import SEVERITY, Assertion, Judgement
-from cavsumo.bodies import Action, Body, Kind
+from cavsumo.bodies import Action, Kind
 from cavsumo.contacts import ContactMonitor
 from cavsumo.egos.base import Drive, Ego
 from cavsumo.errors import AgentError
 from cavsumo.kinematics import step_floats
-from cavsumo.rewards import Ledger
+from cavsumo.rewards import Feedback, Ledger
 from cavsumo.roads import Start
 from cavsumo.scenario import Simulation
 from cavsumo.scene import Scene
-from cavsumo.site import Site
 from cavsumo.snapshot import BodyState, Snapshot
-from cavsumo.world import World
+from cavsumo.stage import Stage
 
 # An episode whose verdict is open at the horizon may run on for this long [s].
 OVERTIME_S = 15.0
-
-
-@dataclass(frozen=True)
-class Stage:
-    """All that episodes of one scenario share.
-
-    Attributes:
-        world, site, ego, assertions: as built from the scenario.
-        teams: the agents' bodies: for each agent the indices of those it owns.
-        bodies: the testers' bodies.
-        horizon: length of an episode [s].
-        start_speed: of the testers [m/s]; None for their maximum.
-    """
-
-    world: World
-    site: Site
-    ego: Ego
-    assertions: tuple[Assertion, ...]
-    teams: tuple[tuple[int, ...], ...]
-    bodies: tuple[Body, ...]
-    horizon: float
-    start_speed: float | None = None
 
 
 @dataclass
@@ -69,6 +46,70 @@ class Episode:
     frames: list[Snapshot] = field(default_factory=list)
 
 
+class Performance:
+    """One episode under way (Algorithm 1).
+
+    Args:
+        agents: one for each team, kept from episode to episode, so that learners learn.
+        seed: of the episode; every random number in it comes from here.
+        record: keep every snapshot.
+        simulation: whose it is played in (``World.reset``).
+
+    Attributes:
+        scene: what does not change during the episode.
+        snapshot: what is seen now.
+        over: whether it has ended.
+    """
+
+    def __init__(
+        self,
+        stage: Stage,
+        agents: Sequence[Agent],
+        seed: int,
+        *,
+        record: bool = False,
+        simulation: Simulation = "own",
+    ) -> None:
+        self._stage, self._agents, self._record = stage, agents, record
+        self.scene, self.snapshot = _reset(stage, agents, seed, record, simulation)
+        self._ledger = Ledger(self.scene, stage.teams)
+        self._episode = Episode(Judgement(""))
+        self._learners = any(type(a).process_feedback is not Agent.process_feedback for a in agents)
+        _observe(stage, self._episode, self.snapshot, record)
+        self.over = _over(stage, self.snapshot)
+
+    def step(self) -> Feedback | None:
+        """One timestep: everybody chooses, the world moves on; what the agents earned by it.
+
+        None once their game is over, although the episode may go on until all is decided.
+        """
+        stage, episode, snapshot, agents = self._stage, self._episode, self.snapshot, self._agents
+        scene = self.scene
+        actions = [agent.choose_action(snapshot) for agent in agents]
+        states = _moved(snapshot.testers, stage.teams, actions, scene.dt)
+        command = stage.ego.act(snapshot)
+        successor = stage.world.step(states, command)
+        if successor is None or (isinstance(command, Drive) and _at_end(scene, successor)):
+            self.over = True
+            rewards = self._ledger.lost()
+            _feed_back(agents, snapshot, actions, rewards, snapshot)
+            return rewards
+        braking = (snapshot.ego.v - successor.ego.v) / scene.dt
+        if braking > episode.max_decel:
+            episode.max_decel = braking
+        _observe(stage, episode, successor, self._record)
+        rewards = self._ledger.rewards(successor, [a.judgement for a in stage.assertions])
+        if self._learners:
+            _feed_back(agents, snapshot, actions, rewards, successor)
+        self.snapshot = successor
+        self.over = _over(stage, successor)
+        return rewards
+
+    def finished(self) -> Episode:
+        """What happened."""
+        return _finished(self._stage, self._episode, self.snapshot, self._ledger)
+
+
 def play(
     stage: Stage,
     agents: Sequence[Agent],
@@ -77,36 +118,11 @@ def play(
     record: bool = False,
     simulation: Simulation = "own",
 ) -> Episode:
-    """One episode (Algorithm 1).
-
-    Args:
-        agents: one for each team, kept from episode to episode, so that learners learn.
-        seed: of the episode; every random number in it comes from here.
-        record: keep every snapshot.
-        simulation: whose it is played in (``World.reset``).
-    """
-    scene, snapshot = _reset(stage, agents, seed, record, simulation)
-    ledger = Ledger(scene, stage.teams)
-    episode = Episode(Judgement(""))
-    _observe(stage, episode, snapshot, record)
-    learners = any(type(a).process_feedback is not Agent.process_feedback for a in agents)
-    while not _over(stage, snapshot):
-        actions = [agent.choose_action(snapshot) for agent in agents]
-        states = _moved(snapshot.testers, stage.teams, actions, scene.dt)
-        command = stage.ego.act(snapshot)
-        successor = stage.world.step(states, command)
-        if successor is None or (isinstance(command, Drive) and _at_end(scene, successor)):
-            _feed_back(agents, snapshot, actions, ledger.lost(), snapshot)
-            break
-        braking = (snapshot.ego.v - successor.ego.v) / scene.dt
-        if braking > episode.max_decel:
-            episode.max_decel = braking
-        _observe(stage, episode, successor, record)
-        rewards = ledger.rewards(successor, [a.judgement for a in stage.assertions])
-        if learners:
-            _feed_back(agents, snapshot, actions, rewards, successor)
-        snapshot = successor
-    return _finished(stage, episode, snapshot, ledger)
+    """A whole episode; the arguments are those of ``Performance``."""
+    performance = Performance(stage, agents, seed, record=record, simulation=simulation)
+    while not performance.over:
+        performance.step()
+    return performance.finished()
 
 
 def _reset(
@@ -118,13 +134,9 @@ def _reset(
     kinds = [body.kind for body in stage.bodies]
     ego = stage.world.ego_body
     starts = stage.site.draw(kinds, ego.kind, stage.start_speed, placing)
+    site = stage.site
     scene = Scene(
-        stage.world.dt,
-        ego,
-        stage.site.route.path,
-        stage.bodies,
-        starts,
-        stage.site.roads,
+        stage.world.dt, ego, site.route.path, stage.bodies, starts, site.roads, site.lights, seed
     )
     watching: list[Ego | Agent | Assertion] = [stage.ego, *agents, *stage.assertions]
     # Vehicles keep their distance to whoever is ahead of them, so they see everybody.
@@ -205,7 +217,7 @@ def _feed_back(
     agents: Sequence[Agent],
     snapshot: Snapshot,
     actions: Sequence[tuple[Action, ...]],
-    rewards: tuple[list[float], bool] | None,
+    rewards: Feedback | None,
     successor: Snapshot,
 ) -> None:
     """ProcessFeedback for every agent, until the game is over."""

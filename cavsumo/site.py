@@ -21,8 +21,8 @@ from cavsumo.errors import NetworkError
 from cavsumo.geometry import Box
 from cavsumo.kerbs import kerb_areas
 from cavsumo.network import Network, read_network
-from cavsumo.roads import Approach, Roads, Start
-from cavsumo.signals import LightStart, Pace, Signal, light_start
+from cavsumo.roads import Approach, Light, Roads, Start
+from cavsumo.signals import LightStart, Pace, Signal, light_start, lights_along
 from cavsumo.starts import StartingArea, draw_starts, starting_areas
 from cavsumo.traffic import Volume, background
 from cavsumo.vehicle_starts import draw_vehicles
@@ -44,6 +44,7 @@ class Site:
         demand: background traffic drawn for it, as the text of a route file; None for none.
         light: how the first traffic light on the ego's route begins an episode; None for as it is.
         approaches: the ways on which tester vehicles may meet the ego; none for testers on foot.
+        lights: the traffic lights on the ego's route.
     """
 
     net: Path
@@ -54,6 +55,7 @@ class Site:
     demand: str | None = None
     light: LightStart | None = None
     approaches: tuple[Approach, ...] = ()
+    lights: tuple[Light, ...] = ()
 
     def draw(
         self, kinds: Sequence[Kind], ego: Kind, start_speed: float | None, rng: np.random.Generator
@@ -137,6 +139,7 @@ def _derived(
         background(network, route, wishes.volume) if wishes.volume else None,
         light_start(network, route, wishes.signal, wishes.pace),
         ways,
+        lights_along(network, route),
     )
 
 

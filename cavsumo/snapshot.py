@@ -49,6 +49,8 @@ class Snapshot(NamedTuple):
         raw_background: everybody else, as plain tuples in the field order of BodyState. When no
             ego, agent or assertion of the episode ``sees_background`` and nothing is recorded,
             those are left out who cannot touch the ego or a tester now (see ``background``).
+        lights: what each of ``Scene.lights`` shows the ego, as SUMO's letter (G and g are green, y
+            is yellow, r is red); empty when nobody looks, as above.
     """
 
     step: int
@@ -57,6 +59,7 @@ class Snapshot(NamedTuple):
     ego_steering: float
     testers: tuple[BodyState, ...]
     raw_background: tuple[RawState, ...] = ()
+    lights: tuple[str, ...] = ()
 
     @property
     def background(self) -> tuple[BodyState, ...]:

@@ -7,15 +7,13 @@ from collections.abc import Sequence
 from typing import Any
 
 from cavsumo.agents import Agent
-from cavsumo.assertions import ASSERTIONS
-from cavsumo.egos import make_ego
 from cavsumo.errors import CavsumoError
-from cavsumo.jobs import Job, episode_seed, failed, head, make_agents, teams, tester_bodies
+from cavsumo.jobs import Job, episode_seed, failed, head, make_agents
 from cavsumo.outcomes import Outcome, Row, frame, trace_text
 from cavsumo.scenario import BatchPlan, Simulation
-from cavsumo.simulator import Episode, Stage, play
+from cavsumo.simulator import Episode, play
 from cavsumo.site import Site
-from cavsumo.world import World
+from cavsumo.stage import set_stage
 
 
 class Theatre:
@@ -23,30 +21,18 @@ class Theatre:
 
     def __init__(self, plan: BatchPlan, site: Site) -> None:
         self.plan = plan
-        scenario = plan.scenario
-        ego = make_ego(scenario.ego, scenario.ego_params)
-        self.stage = Stage(
-            world=World(scenario, site, ego),
-            site=site,
-            ego=ego,
-            assertions=tuple(
-                ASSERTIONS.make(name, scenario.assertion_params) for name in scenario.assertions
-            ),
-            teams=teams(scenario),
-            bodies=tester_bodies(scenario),
-            horizon=scenario.end,
-            start_speed=scenario.start_speed,
-        )
+        self.stage = set_stage(plan.scenario, site)
         self._agents: dict[str, tuple[list[Agent], tuple[Any, ...] | None]] = {}
 
     def __enter__(self) -> Theatre:
         return self
 
     def __exit__(self, *_: object) -> None:
-        self.stage.world.close()
+        self.stage.close()
 
     def rehearse(self) -> None:
-        """Start SUMO once, so that what it refuses comes out before anything is written."""
+        """Start the ego and SUMO once: what they refuse comes out before anything is written."""
+        self.stage.ego.prepare(self.stage.mission)
         simulation: Simulation = "own" if self.plan.reset == "fresh" else "new"
         self.stage.world.reset(episode_seed(self.plan.seed, 0), (), (), simulation=simulation)
 

@@ -91,8 +91,8 @@ class World:
         Args:
             simulation: "own" starts SUMO afresh, for the same bits whatever was before; "new"
                 starts one that serves several episodes, of which the later ones say "same".
-            everything: show the whole background in every snapshot; else only those who may touch
-                the ego or a tester, which is all that contacts need.
+            everything: show the whole background and the traffic lights in every snapshot; else
+                only those who may touch the ego or a tester, which is all that contacts need.
 
         Raises SimulationError with SUMO's own words when it refuses, or when the ego finds no
         room to enter.
@@ -110,6 +110,7 @@ class World:
             self._make_room(states, starts)
         self._ego = ego
         self._background = self._lookout(everything, (ego, *states))
+        self._lights = self.site.lights if everything else ()
         return self._snapshot(ego, tuple(states))
 
     def step(self, states: tuple[BodyState, ...], command: Command) -> Snapshot | None:
@@ -285,7 +286,9 @@ class World:
         persons = libsumo.person.getIDList()
         raw = self._background.read(self._vehicles, persons, (ego, *states))
         time = round(self._step * self.dt, 6)
-        return Snapshot(self._step, time, ego, self._steering, states, raw)
+        state = libsumo.trafficlight.getRedYellowGreenState
+        lights = tuple([state(light.id)[light.link] for light in self._lights])
+        return Snapshot(self._step, time, ego, self._steering, states, raw, lights)
 
     def _lookout(self, everything: bool, watchers: Sequence[BodyState]) -> Background:
         """The background of this episode; the network is measured when that first matters."""

@@ -26,8 +26,8 @@ ORDER = """
     contacts
     assertions.base assertions.collision assertions.reaction_zone assertions
     egos.base egos.constant egos.sumo egos.time_gap egos.controller egos
-    options scenario outcomes rewards sumo_types demand simulations world simulator
-    jobs setting theatre worker_process worker batch executors
+    options scenario outcomes rewards sumo_types demand simulations world
+    jobs stage simulator setting theatre worker_process worker batch executors
     statistics tally stopping results recorder learning progress session
     summary interrupts replays listings
     report report.load report.grouping report.rates report.pairs report.compare report.survival

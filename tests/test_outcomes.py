@@ -211,6 +211,7 @@ def test_a_frame_holds_every_body() -> None:
         "steering": 0.25,
         "testers": {"tester0": [5.0, 6.0, 1.0, -0.5]},
         "background": {"car0": [9.0, 9.0, 9.0, 3.0]},
+        "lights": "",
     }
 
 

@@ -103,6 +103,32 @@ def test_a_slow_ego_meets_them_too(open_world: Opener) -> None:
         assert slowest(world) < 0.1
 
 
+def test_what_a_light_shows_is_seen(open_world: Opener, staged: Staged) -> None:
+    """The ego stands before the stop line as long as the snapshots show red, then passes."""
+    wishes = {"signal": "red", "ego_params": CALM}
+    light = staged("junction", **wishes)[1].lights[0]
+    with open_world("junction", **wishes) as world:
+        snapshot = world.reset(3, (), ())
+        assert snapshot.lights[0] == "r"
+        half, path = snapshot.ego.body.kind.length / 2, world.site.route.path
+        nearest, shown = math.inf, set()
+        for _ in range(1200):
+            following = world.step((), None)
+            if following is None:
+                break
+            front = path.project(following.ego.x, following.ego.y).along + half
+            if front < light.along:
+                shown.add(following.lights[0])
+                if following.lights[0] == "r":
+                    nearest = min(nearest, light.along - front)
+        assert shown & set("Gg")
+        assert 0.0 < nearest < 3.0
+        world.reset(3, (), (), everything=False)
+        following = world.step((), None)
+        assert following is not None
+        assert following.lights == ()
+
+
 def test_any_leaves_the_lights_alone(staged: Staged) -> None:
     """Without a wish nothing is computed and nothing set."""
     assert staged("junction")[1].light is None

@@ -4,10 +4,13 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Mapping
+from pathlib import Path
 from typing import ClassVar, NamedTuple
 
 from cavsumo.bodies import CAR, Kind
+from cavsumo.paths import Path as Polyline
 from cavsumo.registry import Registry
+from cavsumo.roads import Light
 from cavsumo.scene import Scene
 from cavsumo.snapshot import Snapshot
 
@@ -31,6 +34,27 @@ class Drive(NamedTuple):
 Command = Acceleration | Drive | None
 
 
+@dataclasses.dataclass(frozen=True)
+class Mission:
+    """What an ego may know before its first episode: all that no episode changes.
+
+    Attributes:
+        net: the network file.
+        edges: ids of the edges of its route.
+        path: centre line of its route, from where its centre starts to where its front arrives.
+        lights: the traffic lights on it.
+        dt: length of a timestep [s].
+        horizon: how long an episode may last [s].
+    """
+
+    net: Path
+    edges: tuple[str, ...]
+    path: Polyline
+    lights: tuple[Light, ...]
+    dt: float
+    horizon: float
+
+
 class Ego:
     """Base of the egos; on its own it leaves the driving to SUMO.
 
@@ -50,6 +74,12 @@ class Ego:
     def vtype(self) -> dict[str, str]:
         """The attributes of its SUMO vehicle type."""
         return {"length": f"{self.kind.length}", "width": f"{self.kind.width}"}
+
+    def prepare(self, mission: Mission) -> None:
+        """Get ready to drive, in the process that simulates; what it raises refuses the batch."""
+
+    def close(self) -> None:
+        """End whatever ``prepare`` started."""
 
     def reset(self, scene: Scene) -> None:
         """Begin an episode."""
