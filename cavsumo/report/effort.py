@@ -52,15 +52,21 @@ class Effort:
 
 def effort(group: Group) -> Effort:
     """The effort of one group."""
-    valid = group.valid
+    valid, events = group.valid, EVENTS.items()
     simulated = valid["time_s"].to_numpy(float)
     real = group.rows["wall_s"].fillna(0.0).to_numpy(float)
-    found: dict[str, PerSecond] = {}
-    for name, happened in EVENTS.items():
-        found[f"{name}_simulated"] = per_second(happened(valid).to_numpy(float), simulated)
-        found[f"{name}_real"] = per_second(happened(group.rows).to_numpy(float), real)
+    per_simulated, per_real = (
+        {name: per_second(happened(rows).to_numpy(float), seconds) for name, happened in events}
+        for rows, seconds in ((valid, simulated), (group.rows, real))
+    )
     return Effort(
-        **group.label, simulated_s=float(simulated.sum()), real_s=float(real.sum()), **found
+        **group.label,
+        simulated_s=float(simulated.sum()),
+        real_s=float(real.sum()),
+        tests_simulated=per_simulated["tests"],
+        failures_simulated=per_simulated["failures"],
+        tests_real=per_real["tests"],
+        failures_real=per_real["failures"],
     )
 
 

@@ -7,7 +7,7 @@ closing speed of an impact is known, from the row.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -15,9 +15,14 @@ import pandas
 
 from cavsumo.egos.base import EGO_KIND
 from cavsumo.report.load import Evidence
-from cavsumo.results import read_trace
+from cavsumo.results import read_moments
 
+Pose = Sequence[float]  # x, y [m], v [m/s], o [rad]
+Moment = tuple[float, dict[str, Any]]  # how far the ego has driven [m], the frame
 FRONT, LEFT, RIGHT, REAR = "front", "left", "right", "rear"
+
+USED = ["batch", "outcome", "tester", "trace", "trigger_time_s", "violation_time_s"]
+USED += ["impact_speed_mps"]
 
 
 class Event(NamedTuple):
@@ -54,44 +59,43 @@ def described(evidence: Evidence) -> dict[int, Described]:
 
 def _each(evidence: Evidence, tests: pandas.DataFrame) -> Iterator[tuple[int, Described]]:
     """The tests one by one; only one trace is in memory at a time."""
-    for index, row in zip(tests.index, tests.to_dict("records"), strict=True):
+    for index, row in zip(tests.index, tests[USED].to_dict("records"), strict=True):
         folder = evidence.batches[row["batch"]].csv_file.parent
         yield int(index), describe(row, folder)
 
 
 def describe(row: Mapping[str, Any], folder: Path) -> Described:
     """One test, from its row and from the trace it names, relative to a folder."""
-    frames = read_trace(folder / row["trace"]) if row["trace"] else []
-    trigger = _event(frames, row["trigger_time_s"], row["tester"], impact=False)
-    if row["outcome"] != "violated":
+    failed = row["outcome"] == "violated"
+    times = [row["trigger_time_s"], *([row["violation_time_s"]] if failed else [])]
+    moments = read_moments(folder / row["trace"], times) if row["trace"] else [None] * len(times)
+    trigger = _event(moments[0], row["tester"], side_ahead)
+    if not failed:
         return Described(trigger, None)
-    impact = _event(frames, row["violation_time_s"], row["tester"], impact=True)
     speed = row["impact_speed_mps"]
+    impact = _event(moments[1], row["tester"], side_hit)
     return Described(trigger, impact._replace(speed=None if math.isnan(speed) else speed))
 
 
-def _event(frames: Sequence[Mapping[str, Any]], time: float, tester: str, *, impact: bool) -> Event:
-    """The moment of a trace nearest to a time; nothing known without frames or tester."""
-    if not frames or tester not in frames[0]["testers"]:
+def _event(moment: Moment | None, tester: str, side: Callable[[Pose, Pose], str]) -> Event:
+    """A moment of a trace; nothing is known without it or without the tester."""
+    if moment is None or tester not in moment[1]["testers"]:
         return Event()
-    i = min(range(len(frames)), key=lambda k: abs(frames[k]["time_s"] - time))
-    ego, other = frames[i]["ego"], frames[i]["testers"][tester]
-    way = [frame["ego"] for frame in frames[: i + 1]]
-    place = sum(math.hypot(b[0] - a[0], b[1] - a[1]) for a, b in zip(way, way[1:], strict=False))
+    place, frame = moment
+    ego, other = frame["ego"], frame["testers"][tester]
     speed = ego[2] - other[2] * math.cos(other[3] - ego[3])
-    side = (side_hit if impact else side_ahead)(ego, other)
-    return Event(speed, side, place, other[0], other[1])
+    return Event(speed, side(ego, other), place, other[0], other[1])
 
 
-def side_ahead(ego: Sequence[float], other: Sequence[float]) -> str:
-    """Where a body is across the ego's heading; poses are [x, y, v, o]."""
+def side_ahead(ego: Pose, other: Pose) -> str:
+    """Where a body is across the ego's heading."""
     _, across = _seen(ego, other)
     if abs(across) <= EGO_KIND.width / 2:
         return FRONT
     return LEFT if across > 0 else RIGHT
 
 
-def side_hit(ego: Sequence[float], other: Sequence[float]) -> str:
+def side_hit(ego: Pose, other: Pose) -> str:
     """The side of the ego's box from which a body's centre is farthest out, or least deep inside.
 
     The box is that of cavsumo's egos, 5 m by 1.8 m.
@@ -102,7 +106,7 @@ def side_hit(ego: Sequence[float], other: Sequence[float]) -> str:
     return LEFT if across > 0 else RIGHT
 
 
-def _seen(ego: Sequence[float], other: Sequence[float]) -> tuple[float, float]:
+def _seen(ego: Pose, other: Pose) -> tuple[float, float]:
     """A body's centre as the ego sees it: ahead and to the left [m]."""
     dx, dy, c, s = other[0] - ego[0], other[1] - ego[1], math.cos(ego[3]), math.sin(ego[3])
     return dx * c + dy * s, dy * c - dx * s

@@ -8,6 +8,7 @@ import json
 from collections.abc import Callable, Iterable, Iterator
 
 from rich.console import Console
+from rich.measure import Measurement
 from rich.padding import Padding
 from rich.table import Table as Grid
 from rich.text import Text
@@ -16,19 +17,25 @@ from cavsumo.report.analysis import Report
 from cavsumo.report.figures import COLUMNS, as_json, lines
 from cavsumo.report.tables import Table, tables
 
-WIDTH = 100
+WIDTH, INDENT = 100, 2
+WIDEST = 1000  # of tables whose figures need it, which are never cut off
+WORD = 28  # columns that words need at least, where there are so many
 
 
 def as_table(report: Report) -> str:
-    """Tables for people, at most 100 columns wide."""
+    """Tables for people, 100 columns wide where the figures allow it."""
     console = Console(file=io.StringIO(), width=WIDTH, color_system=None)
     for i, table in enumerate(tables(report)):
         if i:
             console.print()
         console.print(Text(table.title))
-        console.print(Padding(_grid(table), (0, 0, 0, 2)), highlight=False)
+        grid = _grid(table)
+        least = Measurement.get(console, console.options.update(width=WIDEST), grid).minimum
+        console.width = max(WIDTH, least + INDENT)
+        console.print(Padding(grid, (0, 0, 0, INDENT)), highlight=False)
+        console.width = WIDTH
         for note in table.notes:
-            console.print(Padding(Text(note), (0, 0, 0, 2)), highlight=False)
+            console.print(Padding(Text(note), (0, 0, 0, INDENT)), highlight=False)
     stream = console.file
     assert isinstance(stream, io.StringIO)
     return "".join(f"{line.rstrip()}\n" for line in stream.getvalue().splitlines())
@@ -37,8 +44,9 @@ def as_table(report: Report) -> str:
 def _grid(table: Table) -> Grid:
     """A table as rich draws it; words that repeat those above are left out."""
     grid = Grid(box=None, pad_edge=False, padding=(0, 2, 0, 0))
-    for title in table.words:
-        grid.add_column(Text(title), overflow="fold")
+    for i, title in enumerate(table.words):
+        longest = max((len(row[i]) for row in table.rows), default=0)
+        grid.add_column(Text(title), overflow="fold", min_width=min(WORD, longest))
     for title in table.numbers:
         grid.add_column(Text(title), justify="right", no_wrap=True)
     above: list[str] = []

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -62,11 +63,13 @@ def grouped(evidence: Evidence, by: str = "agent") -> list[Group]:
     Batches whose scenarios, files and versions agree are one setting (``setting.differences``), so
     shards and batches of other seeds are told together; but each episode counts once.
     """
-    _check_once(evidence)
+    if by != "file":  # which tells them apart
+        _check_once(evidence)
     settings = settings_of(evidence.batches, by)
     names = _names(evidence.batches, settings)
     place = evidence.rows["batch"].map(dict(enumerate(settings)))
-    keys = [place, evidence.rows["agent"], *([] if by == "agent" else [evidence.rows[by]])]
+    keys = [place, evidence.rows["agent"]]
+    keys += [] if by == "agent" else [evidence.rows[by].map(_word)]
     found = list(evidence.rows.groupby(keys, sort=False))
     if len(found) > MOST:
         raise InputError(f"--by {by}: {len(found)} groups, expected a column with few values")
@@ -121,15 +124,29 @@ def _check_once(evidence: Evidence) -> None:
     """Refuse batches that hold the same episode, which would count twice."""
     if len(evidence.batches) == 1:
         return
-    settings = settings_of(evidence.batches, "agent")
-    rows = evidence.rows.assign(place=evidence.rows["batch"].map(dict(enumerate(settings))))
-    twice = rows.duplicated(["place", "agent", "seed"])
+    settings, plans = settings_of(evidence.batches, "agent"), [b.plan for b in evidence.batches]
+    batch = evidence.rows["batch"]
+    identity = pandas.DataFrame(
+        {
+            "setting": batch.map(dict(enumerate(settings))),
+            "seed": batch.map({i: str(plan.seed) for i, plan in enumerate(plans)}),
+            "agent": evidence.rows["agent"],
+            "episode": evidence.rows["run"] // batch.map(lambda i: len(plans[i].agents)),
+        }
+    )
+    twice = identity.duplicated()
     if not twice.any():
         return
-    second: Any = rows[twice].iloc[0]
-    same = (rows[["place", "agent", "seed"]] == second[["place", "agent", "seed"]]).all(axis=1)
-    first: Any = rows[same].iloc[0]
+    second: Any = evidence.rows[twice].iloc[0]
+    first: Any = evidence.rows[(identity == identity[twice].iloc[0]).all(axis=1)].iloc[0]
     raise InputError(
         f"run {first['run']} of {first['file']!r} and run {second['run']} of {second['file']!r} "
         "are the same episode; leave one of the files out"
     )
+
+
+def _word(value: Any) -> str:
+    """A cell as a word, empty for none."""
+    if isinstance(value, float):
+        return "" if math.isnan(value) else f"{value:g}"
+    return str(value)

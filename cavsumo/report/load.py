@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import operator
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -92,13 +93,10 @@ def _batch(csv_file: Path) -> Batch:
 def _rows(batch: Batch, index: int, by: str) -> pandas.DataFrame:
     """The rows of one file."""
     file = batch.csv_file
-    columns = dict.fromkeys((*NEEDED, *([by] if by in COLUMNS else [])))
-    cells: dict[str, list[str]] = {column: [] for column in columns}
-    for _, row in whole_lines(file):
-        if row is not None:
-            for column, values in cells.items():
-                values.append(row[column])
-    table = pandas.DataFrame(cells, dtype="object")
+    columns = list(dict.fromkeys((*NEEDED, *([by] if by in COLUMNS else []))))
+    pick = operator.itemgetter(*columns)
+    cells = [pick(row) for _, row in whole_lines(file) if row is not None]
+    table = pandas.DataFrame(cells, columns=columns, dtype="object")
     for column in ("run", "seed", *NUMBERS):
         table[column] = _numbers(table, column, file)
     _check_outcomes(table, file)

@@ -58,17 +58,14 @@ class Rates:
 def rates(group: Group) -> Rates:
     """The shares of one group."""
     found = Found(Counter(group.rows["outcome"]))
-    shares = {
-        "tests": (found.tests, found.valid, "valid episodes"),
-        "failures": (found.failures, found.tests, "tests"),
-        "unfair": (found.unfair, found.valid, "valid episodes"),
-    }
-    found_shares = {name: share(*of, sequential=group.sequential) for name, of in shares.items()}
+    sequential = group.sequential
     return Rates(
         **group.label,
         episodes=found.episodes,
         errors=found.errors,
-        **found_shares,
+        tests=share(found.tests, found.valid, "valid episodes", sequential=sequential),
+        failures=share(found.failures, found.tests, "tests", sequential=sequential),
+        unfair=share(found.unfair, found.valid, "valid episodes", sequential=sequential),
     )
 
 

@@ -187,7 +187,6 @@ def _times(found: Sequence[TimeToTest], labels: Labels) -> Table:
     rows = [
         [
             *labels.cells(one),
-            str(one.tests),
             str(one.censored),
             "" if one.median is None else f"{one.median:.1f}",
             _span(one.median_interval, ".1f"),
@@ -197,7 +196,7 @@ def _times(found: Sequence[TimeToTest], labels: Labels) -> Table:
         ]
         for one in found
     ]
-    numbers = ("tests", "censored", "median", "95 %", mean, "95 %", "1st test", "1st failure")
+    numbers = ("censored", "median", "95 %", mean, "95 %", "1st test", "1st failure")
     notes = [
         "Seconds by Kaplan and Meier. Episodes without a test are censored at their end, unfair "
         "ones too: a tester that came too early shows only that there was no test so far.",
