@@ -12,7 +12,7 @@ from typing import Any, NoReturn
 from cavsumo import __version__
 from cavsumo.cli_networks import add_import_osm, add_inspect
 from cavsumo.cli_results import add_merge, add_replay, add_report
-from cavsumo.errors import BatchError, CavsumoError, Exit, InputError
+from cavsumo.errors import BatchError, CavsumoError, DivergenceError, Exit, InputError
 
 # Settings that the command line takes over as they are.
 PLAIN = (
@@ -31,6 +31,9 @@ def main(argv: Sequence[str] | None = None) -> int:
         options = _parser().parse_args(_joined(words))
         status: int = options.command(options)
         return status
+    except DivergenceError as error:
+        print(f"cavsumo: {error}", file=sys.stderr)
+        return Exit.VIOLATED
     except CavsumoError as error:
         print(f"cavsumo: {error}", file=sys.stderr)
         return Exit.NOT_RUN if isinstance(error, BatchError) else Exit.USAGE
