@@ -6,7 +6,10 @@ runs in a process of its own and comes with the extra ``[osm]`` (eclipse-sumo an
 
 from __future__ import annotations
 
+import contextlib
+import io
 import os
+import subprocess
 import sys
 from collections.abc import Mapping
 from importlib.util import find_spec
@@ -16,7 +19,7 @@ from typing import Any
 from xml.sax.saxutils import quoteattr
 
 from cavsumo.errors import InputError
-from cavsumo.netconvert import sumo_home
+from cavsumo.netconvert import sumo_environment, sumo_home
 from cavsumo.scenario import Scenario
 from cavsumo.site import Site
 from cavsumo.sumo_poses import to_sumo
@@ -27,6 +30,7 @@ SHAPES = {"passenger": "passenger", "car": "passenger"}  # SUMO's names of what 
 VIEW = "View #0"
 ZOOM = 1500.0  # per cent; some 80 m across the window
 KEEP_EXACT = 2  # moveToXY: exactly there, on the network or off it
+CONNECT_S = 60  # how long sumo-gui may take to start
 WAY = "cavsumo_way"  # a route that every vehicle is given; nobody follows it
 
 
@@ -56,6 +60,7 @@ def show(
         delay_ms: real time that a timestep takes; None for as long as it lasts.
         close: close the window at the end.
     """
+    import sumolib
     import traci
 
     program = check_gui()
@@ -63,16 +68,23 @@ def show(
     with TemporaryDirectory(prefix="cavsumo-gui-") as folder:
         types = Path(folder) / "types.add.xml"
         types.write_text(_type_file(trace), encoding="utf-8")
+        port = sumolib.miscutils.getFreeSocketPort()
         words = command(program, site.net, types, scenario.step_length, delay, close=close)
+        words += ["--remote-port", str(port)]
+        process = subprocess.Popen(
+            words, env=sumo_environment(sumo_home()), stdin=subprocess.DEVNULL, stdout=sys.stderr
+        )
         try:
-            traci.start(words, stdout=sys.stderr)
+            with contextlib.redirect_stdout(io.StringIO()):  # it tells of every attempt
+                sumo = traci.connect(port, CONNECT_S, proc=process, waitBetweenRetries=1)
         except (traci.TraCIException, traci.FatalTraCIError) as error:
+            process.kill()
+            process.wait()
             raise InputError(f"--gui: sumo-gui cannot be started: {error}") from error
-        try:
-            _play(traci, trace, site)
-            traci.close()  # waits until the window is closed
-        except traci.FatalTraCIError:  # it was closed before the end
-            traci.close(wait=False)
+        with contextlib.suppress(traci.FatalTraCIError):  # its window was closed before the end
+            _play(sumo, trace, site)
+            sumo.close()  # waits until the window is closed
+        process.wait()
 
 
 def command(
@@ -129,6 +141,7 @@ def _play(sumo: Any, trace: Trace, site: Site) -> None:
         _set_lights(sumo, frame, site)
         sumo.simulationStep()
         if not shown:
+            sumo.gui.setSchema(VIEW, "real world")  # bodies as large as they are
             sumo.gui.setZoom(VIEW, ZOOM)
             sumo.gui.trackVehicle(VIEW, "ego")
         shown = set(here)
