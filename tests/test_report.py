@@ -559,4 +559,9 @@ def test_wide_figures_are_never_cut(tmp_path: Path, says: Says) -> None:
     file = write(tmp_path / "w.csv", [(HELD, FAILED)] * 3, agents=agents)
     said = says(file)
     assert "election : programmed-random" in said
-    assert "…" not in said
+    other = write(tmp_path / "other.csv", [(HELD, FAILED)] * 3, testers=2, first=True)
+    both = says(file, other)
+    titles = next(line for line in both.splitlines() if "Wilson" in line)
+    expected = "setting agent of what count share Wilson Clopper-Pearson confidence sequence"
+    assert titles.split() == expected.split()
+    assert "…" not in said + both

@@ -286,11 +286,12 @@ def test_curves_are_those_of_statsmodels(seed: int) -> None:
 def test_the_mean_up_to_a_limit_by_hand() -> None:
     """Tests at 1 and 3, an end at 2, and a limit of 4: 1 + 2 * 2/3 + 1 * 0, and Greenwood's sum."""
     found = curve([1, 3], [2])
-    mean, (low, high) = restricted_mean(found, 4.0)
+    mean, span = restricted_mean(found, 4.0)
     assert mean == pytest.approx(1 + 2 * 2 / 3)
     # at 1: area after 4/3, d / (n (n - d)) = 1/6; at 3 nobody is left
     half = 1.959964 * math.sqrt((4 / 3) ** 2 / 6)
-    assert (low, high) == pytest.approx((mean - half, min(4.0, mean + half)))
+    assert span == pytest.approx((mean - half, min(4.0, mean + half)))
+    assert restricted_mean(curve([], [2, 3]), 2.5) == (2.5, None)
 
 
 def test_means_and_medians_lie_in_their_intervals_often_enough() -> None:
@@ -302,8 +303,8 @@ def test_means_and_medians_lie_in_their_intervals_often_enough() -> None:
         times, ends = rng.exponential(8, 80), rng.uniform(2, 30, 80)
         found = kaplan_meier(np.minimum(times, ends), times <= ends)
         assert found is not None
-        low, high = restricted_mean(found, limit)[1]
-        means += low <= true_mean <= high
+        span = restricted_mean(found, limit)[1]
+        means += span is not None and span[0] <= true_mean <= span[1]
         span = median(found)[1]
         medians += span is not None and span[0] <= true_median <= span[1]
     assert 0.91 <= means / 300 <= 0.98
