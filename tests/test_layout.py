@@ -33,9 +33,10 @@ ORDER = """
     report report.load report.grouping report.rates report.pairs report.compare report.survival
     report.effort report.events report.distinct report.analysis report.tables report.figures
     report.formats report.junit
+    testing.scripts testing.ego_checks testing.agent_checks testing.assertion_checks testing
     commands commands.run commands.replay commands.merge commands.report commands.inspect
-    commands.import_osm
-    cli_networks cli_results cli __main__
+    commands.import_osm commands.check_ego
+    cli_settings cli_egos cli_networks cli_results cli __main__
 """.split()
 
 HEAVY = {"numpy", "pandas", "scipy", "shapely", "libsumo", "sumolib", "pydantic", "rich"}

@@ -19,7 +19,7 @@ import pandas
 from numpy.typing import NDArray
 
 from cavsumo.report.compare import EVENTS
-from cavsumo.report.grouping import Group
+from cavsumo.report.grouping import Group, Told
 from cavsumo.report.pairs import Interval
 
 Floats = NDArray[np.float64]
@@ -45,11 +45,10 @@ class Curve:
 
 
 @dataclass(frozen=True)
-class TimeToTest:
+class TimeToTest(Told):
     """When tests come.
 
     Attributes:
-        setting, agent, value: whose.
         tests, censored: how many episodes ended with a test, how many without.
         median: the time by which half of the episodes would have had a test [s]; None when fewer
             have one before the last is censored.
@@ -63,9 +62,6 @@ class TimeToTest:
         curve: the whole estimate; None without episodes.
     """
 
-    setting: str
-    agent: str
-    value: str
     tests: int
     censored: int
     median: float | None
@@ -164,7 +160,7 @@ def _estimate(group: Group, curve: Curve | None, limit: float | None) -> TimeToT
     if curve is not None and limit is not None:
         mean, near = restricted_mean(curve, limit)
     return TimeToTest(
-        **group.label,
+        *group.whose,
         tests=tests,
         censored=len(valid) - tests,
         median=middle,
