@@ -14,7 +14,7 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 from cavsumo.report.events import Described, Event
-from cavsumo.report.grouping import Group
+from cavsumo.report.grouping import Group, Told
 from cavsumo.report.load import Batch
 
 SPEED_BIN, PLACE_BIN = 2.0, 10.0  # m/s, m
@@ -57,18 +57,14 @@ class Diversity:
 
 
 @dataclass(frozen=True)
-class Distinct:
+class Distinct(Told):
     """How different the tests and the failures of a group are.
 
     Attributes:
-        setting, agent, value: whose.
         tests: at their triggers.
         failures: at their impacts.
     """
 
-    setting: str
-    agent: str
-    value: str
     tests: Diversity
     failures: Diversity
 
@@ -113,7 +109,7 @@ def distinct(group: Group, tests: Mapping[int, Described], batches: tuple[Batch,
     ]
     triggers = [cell_of(test.trigger, kind, "") for test, kind in found]
     impacts = [cell_of(test.impact, kind, "") for test, kind in found if test.impact is not None]
-    return Distinct(**group.label, tests=diversity(triggers), failures=diversity(impacts))
+    return Distinct(*group.whose, tests=diversity(triggers), failures=diversity(impacts))
 
 
 def diversity(cells: Iterable[Cell | None]) -> Diversity:

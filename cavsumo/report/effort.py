@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cavsumo.report.compare import EVENTS
-from cavsumo.report.grouping import Group
+from cavsumo.report.grouping import Group, Told
 from cavsumo.report.pairs import Interval
 
 
@@ -27,11 +27,10 @@ class PerSecond:
 
 
 @dataclass(frozen=True)
-class Effort:
+class Effort(Told):
     """What a group took and gave.
 
     Attributes:
-        setting, agent, value: whose.
         simulated_s: simulated time of its valid episodes [s].
         real_s: real time of the processes that played all its episodes, errors included [s]; that
             is CPU time as long as there are no more processes than processors.
@@ -39,9 +38,6 @@ class Effort:
         tests_real, failures_real: per second of real time of a process.
     """
 
-    setting: str
-    agent: str
-    value: str
     simulated_s: float
     real_s: float
     tests_simulated: PerSecond
@@ -60,7 +56,7 @@ def effort(group: Group) -> Effort:
         for rows, seconds in ((valid, simulated), (group.rows, real))
     )
     return Effort(
-        **group.label,
+        *group.whose,
         simulated_s=float(simulated.sum()),
         real_s=float(real.sum()),
         tests_simulated=per_simulated["tests"],

@@ -87,7 +87,7 @@ def lines(report: Report) -> Iterator[Line]:
     }
     for section, records in sections.items():
         for record in records:
-            head = (section, *(getattr(record, label) for label in LABELS))
+            head = (section, *record.whose)
             for field in dataclasses.fields(record):
                 if field.name not in (*LABELS, "curve") and not field.name.endswith("_interval"):
                     for figure in _figures(record, field.name):

@@ -44,11 +44,12 @@ def as_table(report: Report) -> str:
 def _grid(table: Table) -> Grid:
     """A table as rich draws it; words that repeat those above are left out."""
     grid = Grid(box=None, pad_edge=False, padding=(0, 2, 0, 0))
-    for i, title in enumerate(table.words):
-        longest = max((len(row[i]) for row in table.rows), default=0)
-        grid.add_column(Text(title), overflow="fold", min_width=min(WORD, longest))
-    for title in table.numbers:
-        grid.add_column(Text(title), justify="right", no_wrap=True)
+    for i, title in enumerate((*table.words, *table.numbers)):
+        longest = max(len(cell) for cell in (title, *(row[i] for row in table.rows)))
+        if i < len(table.words):
+            grid.add_column(Text(title), overflow="fold", min_width=min(WORD, longest))
+        else:
+            grid.add_column(Text(title), justify="right", no_wrap=True, min_width=longest)
     above: list[str] = []
     for row in table.rows:
         grid.add_row(*(Text(cell) for cell in _without_repeats(list(row), above, table)))

@@ -25,24 +25,39 @@ MEANT: dict[str, frozenset[str]] = {
     "sumo_width_m": frozenset({"sumo_width"}),
     "net": frozenset({"net", "routes", "additional", "ego_route", "junction"}),
 }
+COMPARED = ("versions", "sha256", "sumo_options")  # parts of a manifest, besides the plan
 WITH_FILES = ("net", "file")  # where the files' checksums differ too
 
 
 @dataclass(frozen=True)
-class Group:
-    """Rows that are told together.
+class Told:
+    """What is told of a group; base of the records that say something of one.
 
     Attributes:
         setting: which setting, as the names of the files; empty when there is only one.
         agent: the tester agent.
         value: the value of the column that rows are grouped by; empty when by agent.
-        rows: its rows (``Evidence.rows``), by file and run.
-        sequential: how many rows there are may depend on what they found.
     """
 
     setting: str
     agent: str
     value: str
+
+    @property
+    def whose(self) -> tuple[str, str, str]:
+        """The setting, the agent and the value."""
+        return self.setting, self.agent, self.value
+
+
+@dataclass(frozen=True)
+class Group(Told):
+    """Rows that are told together.
+
+    Attributes:
+        rows: its rows (``Evidence.rows``), by file and run.
+        sequential: how many rows there are may depend on what they found.
+    """
+
     rows: pandas.DataFrame
     sequential: bool
 
@@ -50,11 +65,6 @@ class Group:
     def valid(self) -> pandas.DataFrame:
         """The rows that count as tried."""
         return self.rows[~self.rows["outcome"].isin(("error", "invalid"))]
-
-    @property
-    def label(self) -> dict[str, Any]:
-        """Who it is."""
-        return {"setting": self.setting, "agent": self.agent, "value": self.value}
 
 
 def grouped(evidence: Evidence, by: str = "agent") -> list[Group]:
@@ -103,7 +113,8 @@ def _apart(first: Batch, second: Batch, by: str) -> Iterator[str]:
     """What keeps two batches apart."""
     if by == "file":
         return iter(())
-    left, right = (dict(batch.manifest) for batch in (first, second))
+    empty: dict[str, Any] = {part: {} for part in COMPARED}
+    left, right = (empty | dict(batch.manifest) for batch in (first, second))
     if by in WITH_FILES:
         left, right = left | {"sha256": {}}, right | {"sha256": {}}
     return differences(left, right, apart=APART | MEANT.get(by, frozenset()))

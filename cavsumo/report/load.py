@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import operator
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -21,7 +22,8 @@ OUTCOMES = ("violated", "held", "unfair", "not_triggered", "invalid", "error")
 # What a report needs of the rows; other columns are read only when asked for.
 NUMBERS = ("trigger_time_s", "violation_time_s", "time_s", "impact_speed_mps", "wall_s")
 WORDS = ("agent", "outcome", "assertion", "tester", "trace", "error")
-NEEDED = ("run", *WORDS, "seed", *NUMBERS)
+WHOLE = ("run", "seed")
+NEEDED = (*WHOLE, *WORDS, *NUMBERS)
 ADDED = ("file", "net")  # what one can group by besides the columns
 
 
@@ -97,21 +99,20 @@ def _rows(batch: Batch, index: int, by: str) -> pandas.DataFrame:
     pick = operator.itemgetter(*columns)
     cells = [pick(row) for _, row in whole_lines(file) if row is not None]
     table = pandas.DataFrame(cells, columns=columns, dtype="object")
-    for column in ("run", "seed", *NUMBERS):
+    for column in (*WHOLE, *NUMBERS):
         table[column] = _numbers(table, column, file)
     _check_outcomes(table, file)
-    table = table.astype({"run": "int64"})
     return table.assign(batch=index, file=str(file), net=batch.plan.scenario.name)
 
 
 def _numbers(table: pandas.DataFrame, column: str, file: Path) -> pandas.Series:
     """A column as numbers, whole ones for the seeds."""
     numbers = pandas.to_numeric(table[column].where(table[column] != ""), errors="coerce")
-    wrong = numbers.isna() & (table[column] != "")
-    if column in ("run", "seed"):
-        wrong |= numbers.isna()
-    _refuse(table, wrong, column, "a number", file)
-    return numbers.astype("int64" if column in ("run", "seed") else "float64")
+    wrong = (numbers.isna() & (table[column] != "")) | numbers.isin((math.inf, -math.inf))
+    if column in WHOLE:
+        wrong |= numbers.isna() | (numbers % 1 != 0)
+    _refuse(table, wrong, column, "a whole number" if column in WHOLE else "a number", file)
+    return numbers.astype("int64" if column in WHOLE else "float64")
 
 
 def _check_outcomes(table: pandas.DataFrame, file: Path) -> None:

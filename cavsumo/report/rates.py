@@ -6,7 +6,7 @@ from collections import Counter
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from cavsumo.report.grouping import Group
+from cavsumo.report.grouping import Group, Told
 from cavsumo.statistics import Rate, rate, sequential_rate
 from cavsumo.tally import Found
 
@@ -36,18 +36,14 @@ class Share:
 
 
 @dataclass(frozen=True)
-class Rates:
+class Rates(Told):
     """The shares of one group.
 
     Attributes:
-        setting, agent, value: whose.
         episodes, errors: how many there are, how many could not be played.
         tests, failures, unfair: of valid episodes, of tests, of valid episodes.
     """
 
-    setting: str
-    agent: str
-    value: str
     episodes: int
     errors: int
     tests: Share
@@ -60,7 +56,7 @@ def rates(group: Group) -> Rates:
     found = Found(Counter(group.rows["outcome"]))
     sequential = group.sequential
     return Rates(
-        **group.label,
+        *group.whose,
         episodes=found.episodes,
         errors=found.errors,
         tests=share(found.tests, found.valid, "valid episodes", sequential=sequential),

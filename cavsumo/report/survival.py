@@ -19,7 +19,7 @@ import pandas
 from numpy.typing import NDArray
 
 from cavsumo.report.compare import EVENTS
-from cavsumo.report.grouping import Group
+from cavsumo.report.grouping import Group, Told
 from cavsumo.report.pairs import Interval
 
 Floats = NDArray[np.float64]
@@ -45,26 +45,23 @@ class Curve:
 
 
 @dataclass(frozen=True)
-class TimeToTest:
+class TimeToTest(Told):
     """When tests come.
 
     Attributes:
-        setting, agent, value: whose.
         tests, censored: how many episodes ended with a test, how many without.
         median: the time by which half of the episodes would have had a test [s]; None when fewer
             have one before the last is censored.
         median_interval: its 95 % interval [s], where the curve's interval crosses one half
             (Brookmeyer and Crowley 1982, Biometrics 38, 29); the end may be infinite.
-        mean, mean_interval: the mean time without a test up to the limit [s], normal interval.
+        mean, mean_interval: the mean time without a test up to the limit [s], normal interval; no
+            interval without any test before the limit.
         limit: the time up to which the mean is taken [s], one for all groups.
         first_test, first_failure: which of the group's valid episodes was the first, from 1; None
             for none (that is, more than all of them).
         curve: the whole estimate; None without episodes.
     """
 
-    setting: str
-    agent: str
-    value: str
     tests: int
     censored: int
     median: float | None
@@ -130,8 +127,10 @@ def _first_at_half(times: Floats, values: Floats) -> float | None:
     return float(times[reached[0]]) if len(reached) else None
 
 
-def restricted_mean(curve: Curve, limit: float) -> tuple[float, Interval]:
+def restricted_mean(curve: Curve, limit: float) -> tuple[float, Interval | None]:
     """The area under the curve up to a limit, with its interval by Greenwood's variance.
+
+    No test before the limit leaves nothing to estimate a variance from, and so no interval.
 
     Karrison 1987, J. Am. Stat. Assoc. 82, 1169: the sum over the times of tests of the area that
     still follows, squared, times d / (n (n - d)).
@@ -145,7 +144,10 @@ def restricted_mean(curve: Curve, limit: float) -> tuple[float, Interval]:
     at_risk, died = curve.at_risk[inside], curve.events[inside]
     left = at_risk - died
     terms = np.divide(died, at_risk * left, out=np.zeros_like(died), where=left > 0)
-    half = 1.959963984540054 * math.sqrt(float((after**2 * terms).sum()))
+    variance = float((after**2 * terms).sum())
+    if variance == 0.0:
+        return mean, None
+    half = 1.959963984540054 * math.sqrt(variance)
     return mean, (max(0.0, mean - half), min(limit, mean + half))
 
 
@@ -158,7 +160,7 @@ def _estimate(group: Group, curve: Curve | None, limit: float | None) -> TimeToT
     if curve is not None and limit is not None:
         mean, near = restricted_mean(curve, limit)
     return TimeToTest(
-        **group.label,
+        *group.whose,
         tests=tests,
         censored=len(valid) - tests,
         median=middle,

@@ -5,12 +5,12 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from typing import Protocol
 
 from cavsumo.report.analysis import Report
 from cavsumo.report.compare import EVENTS, Comparison
 from cavsumo.report.distinct import PLACE_BIN, SPEED_BIN, Distinct, Diversity, FailureCell
 from cavsumo.report.effort import Effort, PerSecond
+from cavsumo.report.grouping import Told
 from cavsumo.report.load import Batch
 from cavsumo.report.pairs import Interval
 from cavsumo.report.rates import EXACT, SEQUENTIAL, WILSON, Rates, Share
@@ -41,19 +41,6 @@ class Table:
     heads: int = 0
 
 
-class Labelled(Protocol):
-    """What is said of one group."""
-
-    @property
-    def setting(self) -> str: ...
-
-    @property
-    def agent(self) -> str: ...
-
-    @property
-    def value(self) -> str: ...
-
-
 class Labels:
     """The columns that say of whom a row is, as few as are needed."""
 
@@ -62,7 +49,7 @@ class Labels:
         self.titles = [*(["setting"] if several else []), "agent"]
         self.titles += [] if report.by == "agent" else [report.by]
 
-    def cells(self, of: Labelled) -> list[str]:
+    def cells(self, of: Told) -> list[str]:
         """The cells for a group."""
         words = {"setting": of.setting, "agent": of.agent}
         return [words.get(title, of.value or "(none)") for title in self.titles]
