@@ -41,7 +41,7 @@ ORDER = """
 """.split()
 
 HEAVY = {"numpy", "pandas", "scipy", "shapely", "libsumo", "sumolib", "pydantic", "rich"}
-HEAVY |= {"matplotlib", "osmium", "pyproj", "sumo"}
+HEAVY |= {"matplotlib", "osmium", "pyproj", "sumo", "jinja2", "traci"}
 
 
 def short(name: str) -> str:

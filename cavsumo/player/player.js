@@ -399,15 +399,16 @@
 
   // Graphs
 
-  const nice = (most) => {
+  const nice = (most, steps = [1, 2, 5, 10]) => { // the next round number
     const unit = 10 ** Math.floor(Math.log10(Math.max(most, 1e-3)));
-    return [1, 2, 5, 10].map((k) => k * unit).find((v) => v >= most - 1e-9);
+    return steps.map((k) => k * unit).find((v) => v >= most - 1e-9);
   };
-  const most = (values, limit) => Math.min(limit, nice(values.reduce((a, v) => (v > a ? v : a), 0.5)));
+  const most = (values, limit) =>
+    Math.min(limit, nice(values.reduce((a, v) => (v > a ? v : a), 0.5), [1, 1.2, 1.6, 2, 3, 4, 6, 8, 10]));
   const graphs = [
     { name: "speed", unit: "m/s", top: most(curves.speed, 100), colour: "ego" },
     { name: "gap", unit: "m", top: most(curves.gap, GAP_MOST), colour: "tester" },
-    { name: "ttc", unit: "s", top: most(curves.ttc, TTC_MOST), colour: "braking" },
+    { name: "ttc", unit: "s", top: most(curves.ttc, TTC_MOST), colour: "pedestrian" },
   ].map((graph) => ({ ...graph, canvas: $(`${graph.name}-graph`), values: curves[graph.name] }));
 
   function frameOf(graph) { // the plot's edges in device pixels
