@@ -175,7 +175,11 @@ def _add_scenario(group: Any) -> None:
     )
     add("-a", "--additional-files", metavar="FILES", help="SUMO additional files, with commas")
     add("-c", "--config", metavar="FILE", help="scenario file (TOML)")
-    add("--ego", metavar="NAME", help="an ego by name (see cavsumo egos) or module:Class")
+    add(
+        "--ego",
+        metavar="NAME",
+        help="an ego by name, module:Class, exec:COMMAND, tcp:HOST:PORT; see cavsumo egos",
+    )
     add("--ego-param", action="append", metavar="KEY=VALUE", help="a parameter of the ego")
     add(
         "--ego-route",

@@ -45,7 +45,9 @@ class Scenario(BaseModel):
         "and kilometre of road, each direction counted, and of pavement; instead of routes",
     )
     additional: tuple[Path, ...] = Field((), description="SUMO additional files")
-    ego: str = Field("sumo", description="registered ego or module:Class")
+    ego: str = Field(
+        "sumo", description="registered ego, module:Class, exec:COMMAND or tcp:HOST:PORT"
+    )
     ego_params: Params = Field(default_factory=dict, description="parameters of the ego")
     ego_route: tuple[str, ...] = Field(
         (), description="edges of the ego's route, or one word: straight, left, right or u-turn"
