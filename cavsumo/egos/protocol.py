@@ -132,7 +132,7 @@ def check_hello(line: bytes) -> None:
     """Raise EgoError unless this answers our hello in our version."""
     reply = _typed(line, "hello")
     if reply.get("version") != VERSION or isinstance(reply["version"], bool):
-        said = _quoted(reply["version"]) if "version" in reply else "no version"
+        said = f"version {_quoted(reply['version'])}" if "version" in reply else "no version"
         raise EgoError(f"speaks {said} of the protocol, expected version {VERSION}")
 
 
@@ -189,7 +189,7 @@ def _number(reply: dict[str, Any], name: str) -> float:
     try:
         return float(value)
     except OverflowError:
-        return math.copysign(math.inf, value)
+        return math.inf if value > 0 else -math.inf
 
 
 def shown(line: bytes) -> str:
