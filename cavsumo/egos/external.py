@@ -149,7 +149,7 @@ class ExternalEgo(Ego, ABC):
 
 @EXTERNAL.register("exec")
 class ExecEgo(ExternalEgo):
-    """exec:COMMAND, a program that answers on its stdout what it reads on its stdin."""
+    """A program that answers on its stdout what it reads on its stdin: --ego exec:COMMAND."""
 
     def _aim(self, address: str) -> None:
         self.words = command_words(address)
@@ -160,7 +160,7 @@ class ExecEgo(ExternalEgo):
 
 @EXTERNAL.register("tcp")
 class TcpEgo(ExternalEgo):
-    """tcp:HOST:PORT, a program that listens there and answers the same lines."""
+    """A program that listens there and answers the same lines: --ego tcp:HOST:PORT."""
 
     def _aim(self, address: str) -> None:
         self.host, self.port = host_and_port(address)
