@@ -40,13 +40,13 @@ class Timed(Ego):
     """An ego, with the real time that its answers take."""
 
     def __init__(self, ego: Ego) -> None:
-        self.ego, self.kind, self.spent, self.seen = ego, ego.kind, 0.0, []
+        self.ego, self.kind, self.times, self.seen = ego, ego.kind, [], []
         self.prepare, self.reset, self.close = ego.prepare, ego.reset, ego.close
 
     def act(self, snapshot: Any) -> Any:
         begun = time.perf_counter()
         command = self.ego.act(snapshot)
-        self.spent += time.perf_counter() - begun
+        self.times.append(time.perf_counter() - begun)
         self.seen.append(snapshot)
         return command
 
@@ -96,7 +96,7 @@ def main() -> None:
             for name, stage in stages.items():
                 begun = time.perf_counter()
                 episode = play(stage, make_agents(plan, "timing"), seed)
-                spent[name].append(time.perf_counter() - begun)
+                spent[name].append((time.perf_counter() - begun) / episode.steps)
                 found.add((episode.judgement, episode.steps, episode.contacts.min_gap))
             assert len(found) == 1, f"episode {i} differs: {found}"
             steps += episode.steps
@@ -110,14 +110,14 @@ def report(spent: dict[str, list[float]], stages: dict[str, Any], steps: int) ->
     """One line for each form."""
     episodes = len(spent["class"])
     print(f"{episodes} episodes, {steps / episodes:.0f} timesteps each, the same in every form")
-    print("form             us a timestep   answering   more than the class   of an episode")
-    base = sum(spent["class"])
+    print("medians          us a timestep   answering   more than the class   of its timestep")
+    usual = statistics.median(spent["class"])
+    called = statistics.median(stages["class"].ego.times)
     for name, stage in stages.items():
-        total, ego = sum(spent[name]), stage.ego
-        more = ego.spent - stages["class"].ego.spent
+        answering = statistics.median(stage.ego.times)
         print(
-            f"{name:16} {1e6 * total / steps:13.0f} {1e6 * ego.spent / steps:11.0f} "
-            f"{1e6 * more / steps:21.0f} {more / base:14.1%}"
+            f"{name:16} {1e6 * statistics.median(spent[name]):13.0f} {1e6 * answering:11.0f} "
+            f"{1e6 * (answering - called):21.0f} {(answering - called) / usual:17.1%}"
         )
 
 

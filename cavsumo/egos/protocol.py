@@ -73,9 +73,10 @@ class Observations:
     def __init__(self, scene: Scene) -> None:
         self._scene = scene
         self._half = scene.ego.kind.length / 2
-        # By identity, which is quick to look up; the entry keeps its body, so that no other body
-        # takes its identity.
-        self._heads: dict[int, tuple[Body, str]] = {}
+        # The object of each body up to its numbers, its last state and the whole object then. By
+        # identity, which is quick to look up; the state keeps the body, so that no other one takes
+        # its identity.
+        self._known: dict[int, tuple[str, RawState, str]] = {}
 
     def line(self, snapshot: Snapshot) -> bytes:
         """What is seen at one timestep."""
@@ -93,10 +94,13 @@ class Observations:
 
     def _body(self, state: RawState) -> str:
         body, x, y, v, o = state
-        known = self._heads.get(id(body))
-        if known is None:
-            known = self._heads[id(body)] = body, _head(body)
-        return f'{known[1]}{_f(x)},"y_m":{_f(y)},"heading_rad":{_f(o)},"speed_mps":{_f(v)}}}'
+        known = self._known.get(id(body))
+        if known is not None and known[1] == state:
+            return known[2]  # it stands
+        head = _head(body) if known is None else known[0]
+        text = f'{head}{_f(x)},"y_m":{_f(y)},"heading_rad":{_f(o)},"speed_mps":{_f(v)}}}'
+        self._known[id(body)] = head, state, text
+        return text
 
     def _light(self, snapshot: Snapshot, front: float) -> str:
         """The next traffic light whose stop line the front bumper has not passed."""
