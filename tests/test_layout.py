@@ -31,8 +31,13 @@ ORDER = """
     jobs stage simulator setting theatre worker_process worker batch executors
     statistics tally stopping results recorder learning progress session
     summary interrupts replays listings
-    commands commands.run commands.replay commands.merge commands.inspect commands.import_osm
-    cli_networks cli __main__
+    report report.load report.grouping report.rates report.pairs report.compare report.survival
+    report.effort report.events report.distinct report.analysis report.tables report.figures
+    report.formats report.junit
+    testing.scripts testing.ego_checks testing.agent_checks testing.assertion_checks testing
+    commands commands.run commands.replay commands.merge commands.report commands.inspect
+    commands.import_osm commands.check_ego
+    cli_settings cli_egos cli_networks cli_results cli __main__
 """.split()
 
 HEAVY = {"numpy", "pandas", "scipy", "shapely", "libsumo", "sumolib", "pydantic", "rich"}
