@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import argparse
 import importlib.util
+import json
 import shutil
 import statistics
 import subprocess
@@ -23,7 +24,7 @@ from pathlib import Path
 from typing import Any
 
 from cavsumo.egos import Acceleration, Ego, make_ego
-from cavsumo.egos.protocol import Observations
+from cavsumo.egos.protocol import Observations, hello
 from cavsumo.jobs import episode_seed, make_agents
 from cavsumo.scenario import plan_from
 from cavsumo.setting import prepare
@@ -131,6 +132,10 @@ def parts(stage: Any) -> None:
         f"{statistics.mean(len(s.testers) + len(s.raw_background) for s in seen):.0f} bodies; "
         f"writing it takes {microseconds(seen, writer.line):.0f} us"
     )
+    driver = AsClass().example.Driver()
+    driver.answer(json.loads(hello(stage.mission, stage.ego.kind)))
+    work = microseconds(lines, lambda line: json.dumps(driver.answer(json.loads(line))))
+    print(f"reading it, deciding and answering takes Python {work:.0f} us")
     answers = '{"type": "hello", "version": 1}', '{"type": "ready", "acceleration": 0}'
     ego = make_ego(f"exec:{sys.executable} -c \"{ECHO}\" '{answers[0]}' '{answers[1]}'", {})
     ego.prepare(stage.mission)
