@@ -158,11 +158,10 @@ def _reset(
     snapshot = stage.world.reset(
         seed, _states(stage, starts), starts, everything=everything, simulation=simulation
     )
-    shown = scene.seen_apart(ego_jumps=True) if stage.tester_sensor else scene
     for agent, team, rng in zip(agents, stage.teams, rest, strict=True):
-        agent.reset(shown, team, rng)
+        agent.reset(scene, team, rng)
     type(agents[0]).coordinate(agents, electing)
-    stage.ego.reset(scene.seen_apart(ego_jumps=False) if stage.ego_sensor else scene)
+    stage.ego.reset(scene)
     for assertion in stage.assertions:
         assertion.reset(scene)
     return scene, snapshot, senses

@@ -52,7 +52,7 @@ class Snapshot(NamedTuple):
         lights: what each of ``Scene.lights`` shows the ego, as SUMO's letter (G and g are green, y
             is yellow, r is red); empty when nobody looks, as above.
         unseen: ids of the ego and of testers whom a tester agent does not see through its sensor
-            (``sensors``): they are shown where it last saw them. Empty without a sensor.
+            (``sensors``): they are shown where it last saw them. None without such a sensor.
     """
 
     step: int
@@ -62,12 +62,12 @@ class Snapshot(NamedTuple):
     testers: tuple[BodyState, ...]
     raw_background: tuple[RawState, ...] = ()
     lights: tuple[str, ...] = ()
-    unseen: frozenset[str] = frozenset()
+    unseen: frozenset[str] | None = None
 
     @property
     def sees_ego(self) -> bool:
         """Whether the ego is seen where it is."""
-        return self.ego.body.id not in self.unseen
+        return not self.unseen or self.ego.body.id not in self.unseen
 
     @property
     def background(self) -> tuple[BodyState, ...]:
