@@ -156,8 +156,8 @@ def test_a_batch_is_the_same_for_any_number_of_processes(
 ) -> None:  # fmt: skip
     """Rows and traces byte for byte, other ones than without sensors, and each can be replayed."""
     monkeypatch.chdir(tmp_path)
-    common = ["run", "-n", str(networks["crossing"]), "--ego", "time-gap", "--runs", "4", "-q"]
-    common += ["--exit-zero", "--trace", "all"]
+    common = ["run", "-n", str(networks["pedestrians"]), "--ego", "time-gap", "--runs", "4", "-q"]
+    common += ["--exit-zero", "--trace", "all", "--traffic", "6"]
     eyes = words("--ego-sensor", BAD_EYES | {"range_m": 12}) + words("--tester-sensor", BAD_EYES)
     assert main([*common, *eyes, "-o", "one.csv"]) == 0
     assert main([*common, *eyes, "-o", "two.csv", "-j", "2"]) == 0
