@@ -30,8 +30,10 @@ ORDER = """
     jobs stage simulator setting theatre worker_process worker batch executors
     statistics tally stopping results recorder learning progress session
     summary interrupts replays listings
+    testing.scripts testing.ego_checks testing.agent_checks testing.assertion_checks testing
     commands commands.run commands.replay commands.merge commands.inspect commands.import_osm
-    cli_networks cli __main__
+    commands.check_ego
+    cli_settings cli_egos cli_networks cli __main__
 """.split()
 
 HEAVY = {"numpy", "pandas", "scipy", "shapely", "libsumo", "sumolib", "pydantic", "rich"}

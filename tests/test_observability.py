@@ -229,6 +229,16 @@ def test_what_is_no_sensor_in_a_file_is_refused(networks: dict[str, Path]) -> No
         plan_from({"net": networks["crossing"], "tester_sensor": {"delay": 1}}, "test")
 
 
+def test_a_sensor_that_is_no_table_is_refused_with_options_too(
+    networks: dict[str, Path], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Before the command line's keys are put into it."""
+    file = tmp_path / "s.toml"
+    file.write_text(f'net = "{networks["crossing"]}"\nego_sensor = 50\n', encoding="utf-8")
+    assert main(["run", "-c", str(file), "--ego-sensor", "delay_s=1"]) == 2
+    assert "ego_sensor: expected a table" in capsys.readouterr().err
+
+
 def test_sumos_driver_has_no_sensor(refused: Callable[..., str]) -> None:
     """It sees through SUMO, so a sensor would change nothing without a word."""
     assert "needs a controller" in refused("--ego-sensor", "range_m=20")
