@@ -180,6 +180,13 @@ def _add_scenario(group: Any) -> None:
     )
     add("--ego-param", action="append", metavar="KEY=VALUE", help="a parameter of the ego")
     add(
+        "--ego-sensor",
+        action="append",
+        metavar="KEY=VALUE",
+        help="what the ego sees of others: range_m, position_noise_m, heading_noise_rad, "
+        "speed_noise_mps, delay_s, occlusion=true (default: everybody, exactly, at once)",
+    )
+    add(
         "--ego-route",
         metavar="ROUTE",
         help="edges of the ego's route, with commas or spaces; or straight, left, right, u-turn: "
@@ -205,6 +212,12 @@ def _add_testers(group: Any) -> None:
         action="append",
         metavar="KEY=VALUE",
         help="parameter of the agents that have it; AGENT.KEY=VALUE for one of them",
+    )
+    add(
+        "--tester-sensor",
+        action="append",
+        metavar="KEY=VALUE",
+        help="what the agents see of others, as --ego-sensor",
     )
     add("--kind", help="kind of body: pedestrian (default), car, bus or bicycle")
     add(

@@ -81,6 +81,11 @@ def prepare(plan: BatchPlan) -> Setting:
             "sequence; learn=false plays what was learned"
         )
     ego = make_ego(scenario.ego, scenario.ego_params)
+    if scenario.ego_sensor and type(ego).act is Ego.act:
+        raise InputError(
+            f"ego_sensor: ego {scenario.ego} is driven by SUMO, which sees everybody; a sensor "
+            "needs a controller, such as time-gap"
+        )
     site = derive_site(
         scenario.net, scenario.ego_route, scenario.junction, ego.kind, wishes(plan, kind, ego)
     )

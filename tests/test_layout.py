@@ -19,7 +19,7 @@ ORDER = """
     cavsumo errors checks registry processes kinematics geometry paths bodies snapshot fairness
     roads sumo_poses background
     network ego_routes lane_chains approaches starts vehicle_starts kerbs signals trips traffic
-    site scene
+    site scene sight sensors
     osm handedness netconvert facts inspection layers picture
     agents.base agents.walking agents.driving agents.triggers agents.random agents.features
     agents.manoeuvres agents.behaviours agents.programmed agents.election agents.qlearning agents
