@@ -21,6 +21,7 @@ from cavsumo.executors import Means
 from cavsumo.outcomes import COLUMNS, Outcome
 from cavsumo.replays import Record, compare, located, recorded, recorded_alone, replayed
 from cavsumo.setting import prepare
+from cavsumo.worker import Worker
 
 Frames = list[dict[str, Any]]
 RUN = 1  # the episode that is played again
@@ -70,7 +71,8 @@ def recording(networks: dict[str, Path], tmp_path_factory: pytest.TempPathFactor
     settings = {"net": networks["crossing"], "agents": ["timing"], "runs": 2, "trace": "all"}
     run(settings, file, Means(), Manner(quiet=True, exit_zero=True))
     record = recorded(file, RUN)
-    return Recording(file, record, replayed(prepare(record.plan), record))
+    with Worker(prepare(record.plan)) as worker:
+        return Recording(file, record, replayed(worker, record))
 
 
 def test_a_recorded_episode_comes_out_the_same(recording: Recording) -> None:
