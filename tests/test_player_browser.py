@@ -261,6 +261,7 @@ def test_it_is_dark_in_the_dark(opened: Opened, shown: Shown) -> None:
     dark = pixel(page, *off_road)
     assert dark == colour(page, "ground")
     page.emulate_media(color_scheme="light")
+    page.wait_for_selector('html[data-scheme="light"]')
     light = pixel(page, *off_road)
     assert sum(light[:3]) > 3 * sum(dark[:3])
     assert light == colour(page, "ground")
