@@ -8,9 +8,11 @@ from __future__ import annotations
 import math
 
 from cavsumo.agents.triggers import MAX_DECEL, REACTION_TIME, time_to_walk
+from cavsumo.agents.walking import walk
+from cavsumo.bodies import Action
 from cavsumo.geometry import stopping_distances
 from cavsumo.scene import Scene
-from cavsumo.snapshot import Snapshot
+from cavsumo.snapshot import BodyState, Snapshot
 
 # Targets of a decision: whether to move, and the heading relative to the way across the road.
 TARGETS: tuple[tuple[bool, float], ...] = (
@@ -20,6 +22,13 @@ TARGETS: tuple[tuple[bool, float], ...] = (
     (True, math.pi),
     (True, -math.pi / 2),
 )
+
+
+def towards(state: BodyState, across: float, target: int, dt: float) -> Action:
+    """Throttle and steering towards one of TARGETS, where ``across`` is the way's heading [rad]."""
+    moving, turn = TARGETS[target]
+    return walk(state, across + turn if moving else state.o, moving * state.body.kind.v_max, dt)
+
 
 FEATURES = (
     "bias",  # 1
