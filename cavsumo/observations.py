@@ -125,10 +125,6 @@ class Observer:
             for value, (low, high) in zip(seen, self._bounds, strict=True)
         ]
 
-    def heading(self, i: int, state: BodyState) -> float:
-        """The heading of the way of the i-th owned body, which is in this state [rad]."""
-        return self._mine[i].look(state)[2]
-
     def _own(
         self, snapshot: Snapshot, state: BodyState, way: _Way, front: float
     ) -> tuple[float, ...]:

@@ -65,8 +65,11 @@ class Setting:
             raise InputError(f"{name} is {here} in the process that simulates, expected {there}")
 
 
-def prepare(plan: BatchPlan) -> Setting:
-    """Check every name and parameter of a plan and derive its site; raises InputError."""
+def prepare(plan: BatchPlan, ego: Ego | None = None) -> Setting:
+    """Check every name and parameter of a plan and derive its site; raises InputError.
+
+    ``ego`` drives instead of the one that the plan names.
+    """
     scenario = plan.scenario
     check_agents(plan)
     for name in scenario.assertions:
@@ -79,7 +82,7 @@ def prepare(plan: BatchPlan) -> Setting:
             f"{what}: {' and '.join(sorted(learners(plan)))} learns from episode to episode, in "
             "sequence; learn=false plays what was learned"
         )
-    ego = make_ego(scenario.ego, scenario.ego_params)
+    ego = ego or make_ego(scenario.ego, scenario.ego_params)
     site = derive_site(
         scenario.net, scenario.ego_route, scenario.junction, ego.kind, wishes(plan, kind, ego)
     )

@@ -24,10 +24,16 @@ TARGETS: tuple[tuple[bool, float], ...] = (
 )
 
 
-def towards(state: BodyState, across: float, target: int, dt: float) -> Action:
-    """Throttle and steering towards one of TARGETS, where ``across`` is the way's heading [rad]."""
+def across(scene: Scene, index: int) -> float:
+    """The heading of a body's way across the road, where there is none that of its start [rad]."""
+    way = scene.way(index)
+    return way.heading if way else scene.starts[index].o
+
+
+def towards(state: BodyState, way: float, target: int, dt: float) -> Action:
+    """Throttle and steering towards one of TARGETS, where ``way`` is what ``across`` says."""
     moving, turn = TARGETS[target]
-    return walk(state, across + turn if moving else state.o, moving * state.body.kind.v_max, dt)
+    return walk(state, way + turn if moving else state.o, moving * state.body.kind.v_max, dt)
 
 
 FEATURES = (
@@ -47,8 +53,7 @@ class Features:
 
     def __init__(self, scene: Scene, index: int) -> None:
         self.scene, self.index = scene, index
-        way = scene.way(index)
-        self.across = way.heading if way else scene.starts[index].o
+        self.across = across(scene, index)
         self._seen: tuple[Snapshot, tuple[float, float, float]] | None = None
 
     def values(self, snapshot: Snapshot, target: int) -> list[float]:

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from cavsumo.agents.base import AGENTS, Agent
-from cavsumo.agents.features import towards
+from cavsumo.agents.features import across, towards
 from cavsumo.bodies import WALKING, Action, Kind
 from cavsumo.errors import InputError, UnknownName
 from cavsumo.observations import Observer
@@ -68,6 +68,7 @@ class PolicyAgent(Agent):
     def reset(self, scene: Scene, owned: Sequence[int], rng: np.random.Generator) -> None:
         super().reset(scene, owned, rng)
         self._observer = Observer(scene, owned)
+        self._ways = [across(scene, i) for i in owned]
         self._left = 0  # timesteps that the decision still holds
 
     def choose_action(self, snapshot: Snapshot) -> tuple[Action, ...]:
@@ -76,11 +77,10 @@ class PolicyAgent(Agent):
             self._decide(snapshot)
         self._left -= 1
         if self.policy.header.actions == "targets":
-            seen = self._observer
             return tuple(
-                towards(state, seen.heading(i, state), target, self.scene.dt)
-                for i, (state, target) in enumerate(
-                    zip(self.own(snapshot), self._targets, strict=True)
+                towards(state, way, target, self.scene.dt)
+                for state, way, target in zip(
+                    self.own(snapshot), self._ways, self._targets, strict=True
                 )
             )
         return self._actions
