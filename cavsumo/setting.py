@@ -22,7 +22,7 @@ from cavsumo.demand import BEYOND_S
 from cavsumo.egos import make_ego
 from cavsumo.egos.base import Ego
 from cavsumo.errors import InputError
-from cavsumo.jobs import check_agents, learners, make_agents
+from cavsumo.jobs import check_agents, learners, make_agents, policy_files
 from cavsumo.options import OPTIONS
 from cavsumo.scenario import BatchPlan
 from cavsumo.signals import Pace
@@ -145,6 +145,7 @@ def checksums(plan: BatchPlan) -> dict[str, str]:
     """The SHA-256 of every file that a plan names."""
     scenario = plan.scenario
     files = [scenario.net, *([scenario.routes] if scenario.routes else []), *scenario.additional]
+    files += policy_files(plan)
     return {str(file): hashlib.sha256(file.read_bytes()).hexdigest() for file in files}
 
 

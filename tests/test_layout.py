@@ -23,7 +23,7 @@ ORDER = """
     osm handedness netconvert facts inspection layers picture
     agents.base agents.walking agents.driving agents.triggers agents.random agents.features
     agents.manoeuvres agents.behaviours agents.programmed agents.election agents.qlearning agents
-    observations
+    observations policies agents.policy
     ego_observations
     contacts
     assertions.base assertions.collision assertions.reaction_zone assertions
