@@ -227,7 +227,9 @@ def test_who_begins_an_episode_takes_the_simulation(make: Make) -> None:
     shown, _ = one.reset(seed=1)
     one.step(action)  # the other one was made, but has not begun
     other.reset(seed=1)
-    with pytest.raises(SimulationTaken, match="another world took"):
+    with pytest.raises(
+        SimulationTaken, match="another environment or world took it; reset this one"
+    ):
         one.step(action)
     other.step(np.zeros(1, dtype=np.float32))
     assert np.array_equal(one.reset(seed=1)[0], shown)
