@@ -4,8 +4,9 @@
 
 An agent plays episodes, its actions are noted, and then they are played again: by ``play`` with an
 agent that reads them from a list, and by ``cavsumo/Tester-v0`` in this process and in one of its
-own. All take turns, so that the noise of the machine hits them alike: trust the ratios. Restarts of
-SUMO do not count; observations are made, nothing is learned.
+own. With ``hold`` every fifth action lasts for five timesteps, so those episodes are others. All
+take turns, so that the noise of the machine hits them alike: trust the ratios. Restarts of SUMO do
+not count; observations are made, nothing is learned.
 """
 
 from __future__ import annotations
@@ -28,6 +29,8 @@ from cavsumo.stage import Stage, set_stage
 
 ROOT = Path(__file__).resolve().parent.parent
 ROUNDS = 3  # the fastest counts
+HOLD = 5
+STEP_S = 0.1
 Actions = list[tuple[Action, ...]]
 
 
@@ -53,23 +56,28 @@ def main() -> None:
     seeds = [episode_seed(1, i) for i in range(options.episodes)]
     here = TesterEnv(net=options.net, until="verdict")
     elsewhere = TesterEnv(net=options.net, until="verdict", process="own")
+    held = TesterEnv(net=options.net, until="verdict", hold=HOLD)
     stage = set_stage(here.setting.plan.scenario, here.setting.site)
     noted = {seed: note(stage, options.agent, seed) for seed in seeds}
-    spent = {name: 0.0 for name in ("play", "env", "env, own process")}
+    names = ("play", "env", f"env, hold={HOLD}", "env, own process")
+    spent, steps = dict.fromkeys(names, 0.0), dict.fromkeys(names, 0)
     for seed, actions in noted.items():
-        ways: dict[str, Callable[[], float]] = {
+        ways: dict[str, Callable[[], tuple[float, int]]] = {
             "play": lambda a=actions, s=seed: play_seconds(stage, a, s),
             "env": lambda a=actions, s=seed: env_seconds(here, a, s),
+            f"env, hold={HOLD}": lambda a=actions, s=seed: env_seconds(held, a[::HOLD], s),
             "env, own process": lambda a=actions, s=seed: env_seconds(elsewhere, a, s),
         }
         for name, way in ways.items():
-            spent[name] += min(way() for _ in range(ROUNDS))
-    for closed in (here, elsewhere, stage):
+            seconds, count = min(way() for _ in range(ROUNDS))
+            spent[name], steps[name] = spent[name] + seconds, steps[name] + count
+    for closed in (here, elsewhere, held, stage):
         closed.close()
-    steps = sum(map(len, noted.values()))
-    print(f"{Path(options.net).name}, {options.agent}, {options.episodes} episodes, {steps} steps")
-    for name, seconds in spent.items():
-        print(f"{name:18} {steps / seconds:7.0f} steps/s  {spent['play'] / seconds:5.2f} of play")
+    net, total = Path(options.net).name, steps["play"]
+    print(f"{net}, {options.agent}, {options.episodes} episodes, {total} timesteps")
+    rates = {name: steps[name] / spent[name] for name in names}
+    for name, rate in rates.items():
+        print(f"{name:18} {rate:7.0f} timesteps/s  {rate / rates['play']:5.2f} of play")
 
 
 def note(stage: Stage, agent: str, seed: int) -> Actions:
@@ -88,28 +96,28 @@ def note(stage: Stage, agent: str, seed: int) -> Actions:
     return noted
 
 
-def play_seconds(stage: Stage, actions: Actions, seed: int) -> float:
-    """How long the simulator takes for the timesteps."""
+def play_seconds(stage: Stage, actions: Actions, seed: int) -> tuple[float, int]:
+    """How long the simulator takes, and for how many timesteps."""
     performance = Performance(stage, [Told(actions)], seed)
     begun = time.perf_counter()
     while not performance.over:
         performance.step()
-    return time.perf_counter() - begun
+    return time.perf_counter() - begun, len(actions)
 
 
-def env_seconds(env: TesterEnv, actions: Actions, seed: int) -> float:
-    """How long an environment takes for the same."""
+def env_seconds(env: TesterEnv, actions: Actions, seed: int) -> tuple[float, int]:
+    """How long an environment takes, and for how many timesteps."""
     kind = kind_named(env.setting.plan.scenario.kind)
     limits = np.array([kind.throttle_max, kind.steering_max] * len(actions[0]))
     scaled = [np.array(joint).reshape(-1) / limits for joint in actions]
     env.reset(seed=seed)
     begun = time.perf_counter()
-    ended: Any = False
+    info: dict[str, Any] = {}
     for action in scaled:
-        *_, ended, cut, _ = env.step(action)
-        ended = ended or cut
-    assert ended, "the episodes differ"
-    return time.perf_counter() - begun
+        *_, terminated, truncated, info = env.step(action)
+        if terminated or truncated:
+            break
+    return time.perf_counter() - begun, round(info["time_s"] / STEP_S)
 
 
 if __name__ == "__main__":
