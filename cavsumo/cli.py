@@ -10,16 +10,11 @@ from pathlib import Path
 from typing import Any, NoReturn
 
 from cavsumo import __version__
+from cavsumo.cli_egos import add_check_ego
 from cavsumo.cli_networks import add_import_osm, add_inspect
+from cavsumo.cli_settings import settings_of
 from cavsumo.errors import BatchError, CavsumoError, Exit, InputError
 
-# Settings that the command line takes over as they are.
-PLAIN = (
-    "net routes traffic ego junction signal agents runs seed end step_length testers kind jaywalk "
-    "approaches "
-    "bodies_per_agent embodiment sumo_width start_speed trace assertions "
-    "reset shard first until_tests until_half_width until_rate"
-).split()
 HYPHENATED = ("--bbox", "--ego-route", "--junction")  # options whose values may begin with "-"
 
 
@@ -73,6 +68,7 @@ def _parser() -> argparse.ArgumentParser:
     _add_run(commands)
     _add_replay(commands)
     _add_merge(commands)
+    add_check_ego(commands)
     add_inspect(commands)
     add_import_osm(commands)
     for sort, text in (
@@ -256,7 +252,7 @@ def _run(options: argparse.Namespace) -> int:
 
     manner = Manner(**{f.name: getattr(options, f.name) for f in dataclasses.fields(Manner)})
     means = Means(options.jobs, options.executor, options.scheduler)
-    return run(_settings(options), Path(options.output), means, manner)
+    return run(settings_of(options), Path(options.output), means, manner)
 
 
 def _replay(options: argparse.Namespace) -> int:
@@ -276,41 +272,3 @@ def _list(options: argparse.Namespace) -> int:
 
     print(listing(options.sort, options.name))
     return Exit.OK
-
-
-def _settings(options: argparse.Namespace) -> dict[str, Any]:
-    """The settings of a run: the file's, overruled by the command line's."""
-    from cavsumo.scenario import read_config
-
-    settings = read_config(Path(options.config)) if options.config else {}
-    given = {key: getattr(options, key) for key in PLAIN}
-    given["deadline_s"], given["budget_s"] = options.deadline, options.budget
-    if options.ego_route is not None:
-        given["ego_route"] = options.ego_route.replace(",", " ").split()
-        if not given["ego_route"]:
-            raise InputError(f"--ego-route: expected edges, got {options.ego_route!r}")
-    given["additional"] = options.additional_files and options.additional_files.split(",")
-    settings |= {key: value for key, value in given.items() if value is not None}
-    for key, words in (
-        ("params", options.param),
-        ("ego_params", options.ego_param),
-        ("assertion_params", options.assert_param),
-    ):
-        if words:
-            settings[key] = settings.get(key, {}) | dict(_assignment(key, w) for w in words)
-    return settings
-
-
-def _assignment(option: str, word: str) -> tuple[str, bool | int | float | str]:
-    """KEY=VALUE as a key and a truth value, a number or a word."""
-    key, equals, value = word.partition("=")
-    if not (key and equals):
-        raise InputError(f"{option}: expected KEY=VALUE, got {word!r}")
-    if value in ("true", "false"):
-        return key, value == "true"
-    for number in (int, float):
-        try:
-            return key, number(value)
-        except ValueError:
-            continue
-    return key, value

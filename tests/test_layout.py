@@ -34,8 +34,10 @@ ORDER = """
     envs.elsewhere envs.painting envs.base envs.tester envs.ego envs.parallel envs.discrete envs
     statistics tally stopping results recorder learning progress session
     summary interrupts replays listings
+    testing.scripts testing.ego_checks testing.agent_checks testing.assertion_checks testing
     commands commands.run commands.replay commands.merge commands.inspect commands.import_osm
-    cli_networks cli __main__
+    commands.check_ego
+    cli_settings cli_egos cli_networks cli __main__
 """.split()
 
 HEAVY = {"numpy", "pandas", "scipy", "shapely", "libsumo", "sumolib", "pydantic", "rich"}

@@ -1,0 +1,55 @@
+"""The words of a command line as the settings of a scenario."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+from typing import Any
+
+from cavsumo.errors import InputError
+
+# Settings that the command line takes over as they are.
+PLAIN = (
+    "net routes traffic ego junction signal agents runs seed end step_length testers kind jaywalk "
+    "approaches "
+    "bodies_per_agent embodiment sumo_width start_speed trace assertions "
+    "reset shard first until_tests until_half_width until_rate"
+).split()
+
+
+def settings_of(options: argparse.Namespace) -> dict[str, Any]:
+    """The settings of a run: the file's, overruled by the command line's."""
+    from cavsumo.scenario import read_config
+
+    settings = read_config(Path(options.config)) if options.config else {}
+    given = {key: getattr(options, key) for key in PLAIN}
+    given["deadline_s"], given["budget_s"] = options.deadline, options.budget
+    if options.ego_route is not None:
+        given["ego_route"] = options.ego_route.replace(",", " ").split()
+        if not given["ego_route"]:
+            raise InputError(f"--ego-route: expected edges, got {options.ego_route!r}")
+    given["additional"] = options.additional_files and options.additional_files.split(",")
+    settings |= {key: value for key, value in given.items() if value is not None}
+    for key, words in (
+        ("params", options.param),
+        ("ego_params", options.ego_param),
+        ("assertion_params", options.assert_param),
+    ):
+        if words:
+            settings[key] = settings.get(key, {}) | dict(assignment(key, w) for w in words)
+    return settings
+
+
+def assignment(option: str, word: str) -> tuple[str, bool | int | float | str]:
+    """KEY=VALUE as a key and a truth value, a number or a word."""
+    key, equals, value = word.partition("=")
+    if not (key and equals):
+        raise InputError(f"{option}: expected KEY=VALUE, got {word!r}")
+    if value in ("true", "false"):
+        return key, value == "true"
+    for number in (int, float):
+        try:
+            return key, number(value)
+        except ValueError:
+            continue
+    return key, value

@@ -1,0 +1,158 @@
+"""What every tester agent must do: checks that play scripted drives to it."""
+
+from __future__ import annotations
+
+import json
+import math
+import random
+from collections.abc import Callable, Mapping, Sequence
+
+import numpy as np
+
+from cavsumo.agents.base import Agent
+from cavsumo.bodies import Action
+from cavsumo.egos.base import EGO_KIND
+from cavsumo.kinematics import step_floats
+from cavsumo.scene import Scene
+from cavsumo.snapshot import BodyState, Snapshot
+from cavsumo.testing.scripts import CROWDED, EMPTY, ODD, Ground, Script
+
+MakeAgent = Callable[[], Agent]
+Check = Callable[[MakeAgent, Ground], str]
+TESTERS, OWNED = 4, (0, 2)
+EGO_SPEED = 7.0  # m/s
+Joint = tuple[Action, ...]
+
+
+def choices(agent: Agent, ground: Ground, script: Script, seed: int = 1) -> list[Joint]:
+    """What an agent with two of four bodies does in a script, each action checked.
+
+    The ego drives past at constant speed; bodies of others stand.
+    """
+    scene = ground.scene(EGO_KIND, seed, TESTERS)
+    agent.reset(scene, OWNED, np.random.default_rng(seed))
+    type(agent).coordinate([agent], np.random.default_rng(seed + 1))
+    states = tuple(
+        BodyState(body, start.x, start.y, 0.0, start.o)
+        for body, start in zip(scene.bodies, scene.starts, strict=True)
+    )
+    found: list[Joint] = []
+    snapshot = _snapshot(scene, script, states, 0)
+    for step in range(script.steps):
+        joint = tuple(agent.choose_action(snapshot))
+        check_actions(joint, states, f"at {snapshot.time:g} s")
+        found.append(joint)
+        states = _moved(states, joint, scene.dt)
+        successor = _snapshot(scene, script, states, step + 1)
+        agent.process_feedback(snapshot, joint, -0.1, successor, step + 1 == script.steps)
+        snapshot = successor
+    return found
+
+
+def check_actions(joint: Sequence[Action], states: Sequence[BodyState], at: str) -> None:
+    """Whether there is one action for each body owned, and their effectors can execute it."""
+    assert len(joint) == len(OWNED), f"{at}: {len(joint)} actions for {len(OWNED)} bodies"
+    for i, (throttle, steering) in zip(OWNED, joint, strict=True):
+        kind = states[i].body.kind
+        assert math.isfinite(throttle), f"{at}: throttle is {throttle!r}"
+        assert math.isfinite(steering), f"{at}: steering angle is {steering!r}"
+        assert kind.throttle_min - 1e-9 <= throttle <= kind.throttle_max + 1e-9, (
+            f"{at}: throttle {throttle!r} is not in "
+            f"[{kind.throttle_min:g}, {kind.throttle_max:g}] m/s2"
+        )
+        assert abs(steering) <= kind.steering_max + 1e-9, (
+            f"{at}: steering angle {steering!r} is larger than {kind.steering_max:g} rad"
+        )
+
+
+# The checks
+
+
+def check_acts_for_its_bodies(make: MakeAgent, ground: Ground) -> str:
+    """One action that can be executed for each body it owns, on an empty and a crowded road."""
+    agent = make()
+    count = len(choices(agent, ground, EMPTY)) + len(choices(agent, ground, CROWDED))
+    return f"{count} joint actions"
+
+
+def check_repeatable(make: MakeAgent, ground: Ground) -> str:
+    """The same scene, generator and memory: the same actions, whatever was in between."""
+    agent = make()
+    known = agent.recall()
+    first = choices(agent, ground, CROWDED)
+    choices(agent, ground, EMPTY, seed=2)
+    if known is not None:
+        agent.remember(known)
+    assert choices(agent, ground, CROWDED) == first, "another life of it chose other actions"
+    assert choices(make(), ground, CROWDED) == first, "another one of it chose other actions"
+    return f"{len(first)} joint actions, three times the same"
+
+
+def check_draws_from_its_generator_only(make: MakeAgent, ground: Ground) -> str:
+    """The generators that all share are left alone."""
+    before = random.getstate(), repr(np.random.get_state())
+    choices(make(), ground, CROWDED)
+    assert before[0] == random.getstate(), "it drew from the module random"
+    assert before[1] == repr(np.random.get_state()), "it drew from numpy.random"
+    return "draws from its own only"
+
+
+def check_memory(make: MakeAgent, ground: Ground) -> str:
+    """What it learned is plain data, and another one that takes it up acts alike."""
+    agent = make()
+    choices(agent, ground, CROWDED)
+    memory = agent.recall()
+    if memory is None:
+        assert not agent.learns, "it learns, and recalls nothing"
+        return "learns nothing"
+    text = json.dumps(memory, allow_nan=False)
+    other = make()
+    other.remember(json.loads(text))
+    again = choices(other, ground, EMPTY)
+    agent.remember(json.loads(text))
+    assert choices(agent, ground, EMPTY) == again, "what it recalls is not all that it learned"
+    return f"{len(text)} bytes"
+
+
+def check_sees_what_it_says(make: MakeAgent, ground: Ground) -> str:
+    """An agent that says it does not look at the background does not."""
+    if make().sees_background:
+        return "looks at the background"
+    seen = choices(make(), ground, CROWDED)
+    assert seen == choices(make(), ground, EMPTY), "the background changed what it did"
+    return "the background changes nothing"
+
+
+def check_odd_numbers(make: MakeAgent, ground: Ground) -> str:
+    """Tiny, huge and negative numbers, names with quotes."""
+    return f"{len(choices(make(), ground, ODD))} joint actions"
+
+
+CHECKS: Mapping[str, Check] = {
+    "acts for its bodies": check_acts_for_its_bodies,
+    "repeatable": check_repeatable,
+    "its own generator": check_draws_from_its_generator_only,
+    "memory": check_memory,
+    "sees what it says": check_sees_what_it_says,
+    "odd numbers": check_odd_numbers,
+}
+
+
+def _snapshot(scene: Scene, script: Script, states: tuple[BodyState, ...], step: int) -> Snapshot:
+    """What is seen at a timestep."""
+    along = min(EGO_SPEED * step * scene.dt, scene.ego_path.length)
+    x, y, o = scene.ego_path.at(along)
+    ego = BodyState(scene.ego, x, y, EGO_SPEED, o)
+    time = round(step * scene.dt, 6)
+    return Snapshot(step, time, ego, 0.0, states, script.others(scene, step))
+
+
+def _moved(states: tuple[BodyState, ...], joint: Joint, dt: float) -> tuple[BodyState, ...]:
+    """The bodies after a timestep."""
+    moved = list(states)
+    for i, action in zip(OWNED, joint, strict=True):
+        body, x, y, v, o = states[i]
+        kind = body.kind
+        limits = kind.wheelbase, kind.v_min, kind.v_max
+        moved[i] = BodyState(body, *step_floats(x, y, v, o, *action, *limits, dt))
+    return tuple(moved)
