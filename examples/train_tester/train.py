@@ -17,6 +17,7 @@ import csv
 import sys
 import tempfile
 import time
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -69,15 +70,19 @@ def make_env(net: Path) -> gymnasium.Env[Any, Any]:
     return DiscreteActions(hundredth)
 
 
-def evaluate(net: Path, agent: str, runs: int) -> tuple[Rate, int]:
-    """The rate of tests of an agent in the default scenario, and how many were unfair."""
+def evaluate(net: Path, agents: Sequence[str], runs: int) -> dict[str, tuple[Rate, int]]:
+    """The rate of tests of some agents in the default scenario, and how many were unfair."""
     with tempfile.TemporaryDirectory() as folder:
         results = Path(folder) / "results.csv"
-        settings = {"net": str(net), "agents": [agent], "runs": runs, "trace": "none"}
+        settings = {"net": str(net), "agents": agents, "runs": runs, "trace": "none"}
         run(settings | {"seed": VALIDATION_SEED}, results, Means(), Manner(quiet=True))
-        outcomes = [row["outcome"] for row in read_rows(results)]
-    tests = sum(outcome in ("held", "violated") for outcome in outcomes)
-    return rate(tests, len(outcomes)), outcomes.count("unfair")
+        rows = read_rows(results)
+    found = {}
+    for agent in agents:
+        outcomes = [row["outcome"] for row in rows if row["agent"] == agent]
+        tests = sum(outcome in ("held", "violated") for outcome in outcomes)
+        found[agent] = rate(tests, len(outcomes)), outcomes.count("unfair")
+    return found
 
 
 class Curve(BaseCallback):
@@ -100,7 +105,8 @@ class Curve(BaseCallback):
         options, seconds = self.options, time.perf_counter() - self._begun
         tried = options.output.with_suffix(".tried.npz")
         write_policy(tried, exported(self.model, self.normaliser, HOLD, self._metadata()))
-        found, unfair = evaluate(options.net, f"policy:{tried}", options.evaluations)
+        agent = f"policy:{tried}"
+        found, unfair = evaluate(options.net, [agent], options.evaluations)[agent]
         if found.value is not None and found.value > self._best:
             self._best = found.value
             tried.replace(options.output)
@@ -186,7 +192,8 @@ def main() -> None:
     parser.add_argument("--evaluations", type=int, default=100, help="episodes of an evaluation")
     parser.add_argument("--seed", type=int, default=1, help="of the training")
     options = parser.parse_args()
-    baselines = {name: evaluate(options.net, name, options.evaluations)[0] for name in BASELINES}
+    played = evaluate(options.net, BASELINES, options.evaluations)
+    baselines = {name: found for name, (found, _) in played.items()}
     for name, found in baselines.items():
         print(f"{name}: {found.count} tests in {found.total} episodes", flush=True)
     curve = train(options)
