@@ -23,7 +23,7 @@ from cavsumo.bodies import PEDESTRIAN
 from cavsumo.ego_rewards import HARSH_COST, OFF_ROAD, PROGRESS, TIME_COST, VIOLATION
 from cavsumo.egos import make_ego
 from cavsumo.egos.base import Acceleration, Command
-from cavsumo.envs import tester
+from cavsumo.envs import parallel_env, tester
 from cavsumo.envs.discrete import DiscreteActions
 from cavsumo.envs.ego import EgoEnv
 from cavsumo.errors import AgentError, InputError, SimulationError, SimulationTaken
@@ -247,6 +247,11 @@ def test_a_world_beside_an_environment_takes_the_simulation_too(
         world.reset(1, (), ())
         with pytest.raises(SimulationTaken):
             env.step(np.zeros(6, dtype=np.float32))
+        world.reset(1, (), (), simulation="new")
+        env.reset(seed=1)
+        with pytest.raises(SimulationTaken, match="begin a new"):
+            world.reset(1, (), (), simulation="same")
+        world.reset(1, (), ())
     with pytest.raises(SimulationTaken):
         env.step(np.zeros(6, dtype=np.float32))
     env.reset(seed=1)
@@ -487,3 +492,18 @@ def test_the_picture_shows_the_ego_and_what_is_around_it(make: Make) -> None:
     assert ego[:, 1].mean() == pytest.approx(360 - 176, abs=12)
     assert make().render_mode is None
     assert env.unwrapped.metadata["render_fps"] == 10
+
+
+@pytest.mark.parametrize(
+    ("package", "module", "extra"),
+    [("PIL", "painting", "render"), ("pettingzoo", "parallel", "pettingzoo")],
+)
+def test_what_is_not_installed_is_said_at_once(
+    package: str, module: str, extra: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """With the command that installs it."""
+    monkeypatch.setitem(sys.modules, package, None)
+    monkeypatch.delitem(sys.modules, f"cavsumo.envs.{module}", raising=False)
+    make = tester.TesterEnv if extra == "render" else parallel_env
+    with pytest.raises(InputError, match=rf"pip install 'cavsumo\[{extra}\]'"):
+        make(**SHORT, render_mode="rgb_array")

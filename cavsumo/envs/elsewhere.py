@@ -61,6 +61,9 @@ class Elsewhere:
         except _Gone as gone:
             self.close()
             raise SimulationError(f"{gone}; reset starts another one") from None
+        except BaseException:  # interrupted: the answer must not be taken for the next one's
+            self.close()
+            raise
         if isinstance(answer, CavsumoError):
             raise answer
         return answer
@@ -91,7 +94,7 @@ class _Child:
             raise SimulationError(f"cannot start a process to simulate in: {error}") from error
         finally:
             theirs.close()
-        self.end = weakref.finalize(self, _end, self._process, self._pipe)
+        self.end = weakref.finalize(self, _end, self._process, self._pipe, os.getpid())
         self._pipe.send((setting, roles))
 
     def call(self, method: str, *arguments: Any) -> Any:
@@ -107,8 +110,10 @@ class _Child:
         raise _Gone(f"the simulation process did not answer within {self._deadline:g} s, killed")
 
 
-def _end(process: subprocess.Popen[bytes], pipe: Connection) -> None:
-    """Kill a process, which holds nothing that is missed, and reap it."""
+def _end(process: subprocess.Popen[bytes], pipe: Connection, owner: int) -> None:
+    """Kill a process, which holds nothing that is missed, and reap it; not from a fork."""
     pipe.close()
+    if os.getpid() != owner:
+        return
     process.kill()
     process.wait(10.0)
