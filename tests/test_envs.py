@@ -17,6 +17,7 @@ import pytest
 from gymnasium.error import ResetNeeded
 from gymnasium.utils.env_checker import check_env
 from gymnasium.vector import AsyncVectorEnv
+from support import SHORT, STRAIGHT_NET
 
 from cavsumo.agents import AGENTS
 from cavsumo.bodies import PEDESTRIAN
@@ -37,8 +38,6 @@ from cavsumo.theatre import Theatre
 from cavsumo.world import World
 
 IDS = ("cavsumo/Tester-v0", "cavsumo/Ego-v0")
-NET = str(Path(__file__).parents[1] / "networks" / "pedestrians.net.xml")
-SHORT = {"net": NET, "routes": "none", "end": 6.0}
 Make = Callable[..., Any]
 
 
@@ -95,7 +94,7 @@ def test_importing_or_naming_the_package_registers_the_environments() -> None:
     """In a fresh Python: by import, and by ``module:id`` alone."""
     code = (
         "import gymnasium, sys\n"
-        f"env = gymnasium.make('cavsumo.envs:cavsumo/Tester-v0', net={NET!r}, routes='none')\n"
+        f"env = gymnasium.make('cavsumo.envs:cavsumo/Tester-v0', net={STRAIGHT_NET!r}, routes='none')\n"
         "env.reset(seed=1); env.close()\n"
         "import importlib; importlib.reload(sys.modules['cavsumo.envs'])\n"
         "print([name for name in gymnasium.registry if 'cavsumo' in name])\n"
@@ -460,7 +459,7 @@ def test_a_scenario_file_says_it_all(tmp_path: Path, make: Make) -> None:
     """Its batch settings are left aside; keywords win."""
     file = tmp_path / "scenario.toml"
     file.write_text(
-        f'net = "{NET}"\nroutes = "none"\ntesters = 2\nend = 4.0\nruns = 9\nagents = ["random"]\n'
+        f'net = "{STRAIGHT_NET}"\nroutes = "none"\ntesters = 2\nend = 4.0\nruns = 9\nagents = ["random"]\n'
         '[params]\nrate_per_s = 2.0\n[ego_params]\ncarFollowModel = "IDM"\n',
         encoding="utf-8",
     )

@@ -3,20 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 from gymnasium.error import ResetNeeded
 from pettingzoo.test import parallel_api_test, parallel_seed_test
+from support import SHORT, STRAIGHT_NET
 
 from cavsumo.envs import parallel_env
 from cavsumo.errors import AgentError, InputError
 from cavsumo.rewards import GOAL
 
-NET = str(Path(__file__).parents[1] / "networks" / "pedestrians.net.xml")
-SHORT = {"net": NET, "routes": "none", "end": 6.0}
 Make = Callable[..., Any]
 
 
@@ -102,6 +100,6 @@ def test_wrong_settings_are_refused_in_a_sentence() -> None:
     with pytest.raises(InputError, match="unknown keyword 'nett'; did you mean 'net'"):
         parallel_env(nett=NET)
     with pytest.raises(InputError, match="divide testers 3"):
-        parallel_env(net=NET, bodies_per_agent=2)
+        parallel_env(net=STRAIGHT_NET, bodies_per_agent=2)
     with pytest.raises(InputError, match="ego_params: the ego is moved by"):
-        parallel_env(net=NET, ego_params={"tau": 1})
+        parallel_env(net=STRAIGHT_NET, ego_params={"tau": 1})
