@@ -94,7 +94,7 @@ def test_importing_or_naming_the_package_registers_the_environments() -> None:
     """In a fresh Python: by import, and by ``module:id`` alone."""
     code = (
         "import gymnasium, sys\n"
-        f"env = gymnasium.make('cavsumo.envs:cavsumo/Tester-v0', net={STRAIGHT_NET!r}, routes='none')\n"
+        f"env = gymnasium.make('cavsumo.envs:cavsumo/Tester-v0', **{SHORT!r})\n"
         "env.reset(seed=1); env.close()\n"
         "import importlib; importlib.reload(sys.modules['cavsumo.envs'])\n"
         "print([name for name in gymnasium.registry if 'cavsumo' in name])\n"
@@ -459,7 +459,8 @@ def test_a_scenario_file_says_it_all(tmp_path: Path, make: Make) -> None:
     """Its batch settings are left aside; keywords win."""
     file = tmp_path / "scenario.toml"
     file.write_text(
-        f'net = "{STRAIGHT_NET}"\nroutes = "none"\ntesters = 2\nend = 4.0\nruns = 9\nagents = ["random"]\n'
+        f'net = "{STRAIGHT_NET}"\nroutes = "none"\ntesters = 2\nend = 4.0\n'
+        'runs = 9\nagents = ["random"]\n'
         '[params]\nrate_per_s = 2.0\n[ego_params]\ncarFollowModel = "IDM"\n',
         encoding="utf-8",
     )

@@ -98,7 +98,7 @@ def test_an_ego_with_rewards_of_its_own_plays_on_to_the_verdict(make: Make) -> N
 def test_wrong_settings_are_refused_in_a_sentence() -> None:
     """As those of the Gymnasium environments."""
     with pytest.raises(InputError, match="unknown keyword 'nett'; did you mean 'net'"):
-        parallel_env(nett=NET)
+        parallel_env(nett=STRAIGHT_NET)
     with pytest.raises(InputError, match="divide testers 3"):
         parallel_env(net=STRAIGHT_NET, bodies_per_agent=2)
     with pytest.raises(InputError, match="ego_params: the ego is moved by"):
