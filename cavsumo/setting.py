@@ -152,10 +152,10 @@ def checksums(plan: BatchPlan) -> dict[str, str]:
     scenario = plan.scenario
     files = [scenario.net, *([scenario.routes] if scenario.routes else []), *scenario.additional]
     files += policy_files(plan)
-    return {str(file): _sha256(file) for file in (*files, *ego_files(scenario.ego))}
+    return {str(file): checksum(file) for file in (*files, *ego_files(scenario.ego))}
 
 
-def _sha256(file: Path) -> str:
+def checksum(file: Path) -> str:
     """The SHA-256 of a file, which may be large."""
     try:
         with file.open("rb") as stream:
@@ -179,13 +179,13 @@ def manifest(setting: Setting) -> dict[str, Any]:
         "plan": setting.plan.model_dump(mode="json"),
         "ego_route": list(setting.site.route.edges),
         "junction": setting.site.route.junction,
-        "sha256": dict(setting.checksums) | _traffic_checksum(setting.site),
+        "sha256": dict(setting.checksums) | traffic_checksum(setting.site),
         "versions": dict(setting.versions),
         "sumo_options": dict(OPTIONS),
     }
 
 
-def _traffic_checksum(site: Site) -> dict[str, str]:
+def traffic_checksum(site: Site) -> dict[str, str]:
     """The SHA-256 of the background traffic that was drawn, if any."""
     if site.demand is None:
         return {}
