@@ -26,7 +26,7 @@ def cavsumo(words: list[str], folder: Path) -> subprocess.CompletedProcess[str]:
 def checkout(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A folder as the README's reader has it, with the files that the README shows."""
     folder = tmp_path_factory.mktemp("checkout")
-    for name in ("networks", "routes"):
+    for name in ("networks", "routes", "examples"):
         (folder / name).symlink_to(ROOT / name)
     example = re.search(r"<!-- example: (\S+) -->\n```python\n(.*?)```", README, re.DOTALL)
     scenario = re.search(r"```toml\n(.*?)```", README, re.DOTALL)
