@@ -1,30 +1,28 @@
-"""From a PPO of stable-baselines3 to a policy file that needs no torch."""
+"""From a DQN of stable-baselines3 to a policy file that needs no torch."""
 
 from __future__ import annotations
 
 from typing import Any
 
 import numpy as np
-import torch
-from stable_baselines3 import PPO
+from stable_baselines3 import DQN
 from stable_baselines3.common.vec_env import VecNormalize
 
 from cavsumo.observations import VERSION, entries
 from cavsumo.policies import Header, Observed, Policy
 
-CONSTANT = 1e-6  # variance below which an entry never changed in training
+NOTHING = 1e9  # a scale that leaves nothing of an entry
 
 
-def exported(model: PPO, normaliser: VecNormalize, hold: int, metadata: dict[str, Any]) -> Policy:
+def exported(model: DQN, normaliser: VecNormalize, hold: int, metadata: dict[str, Any]) -> Policy:
     """The greedy policy of a network that scores the targets of one pedestrian.
 
-    An entry that never changed in training (as those of other testers, where there were none) is
-    scaled to nothing, because the network has not learned what to make of it.
+    Where one pedestrian learned, there was no other, and the network has not learned what to make
+    of what others do: those entries are scaled to nothing.
     """
-    network = [*model.policy.mlp_extractor.policy_net, model.policy.action_net]
-    layers = [layer for layer in network if isinstance(layer, torch.nn.Linear)]
-    assert all(isinstance(layer, torch.nn.ReLU) for layer in network if layer not in layers)
-    numbers = tuple((_array(layer.weight).T, _array(layer.bias)) for layer in layers)
+    network = model.q_net.q_net
+    layers = [layer for layer in network if hasattr(layer, "weight")]
+    numbers = [(_array(layer.weight).T, _array(layer.bias)) for layer in layers]
     seen = normaliser.obs_rms
     names = tuple(name for name, _, _ in entries(1, 1.0, 1.0))
     header = Header(
@@ -35,8 +33,9 @@ def exported(model: PPO, normaliser: VecNormalize, hold: int, metadata: dict[str
         actions="targets",
         metadata=metadata,
     )
-    scale = np.where(seen.var < CONSTANT, 1e9, np.sqrt(seen.var + normaliser.epsilon))
-    return Policy(header, seen.mean.astype(np.float64), scale, numbers)
+    absent = np.array([name.startswith("other.") for name in names])
+    scale = np.where(absent, NOTHING, np.sqrt(seen.var + normaliser.epsilon))
+    return Policy(header, seen.mean.astype(np.float64), scale, tuple(numbers))
 
 
 def _array(tensor: Any) -> np.ndarray[Any, Any]:
