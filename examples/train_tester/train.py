@@ -143,7 +143,7 @@ def train(options: argparse.Namespace) -> Curve:
         n_steps=3,
         train_freq=2,
         target_update_interval=500,
-        exploration_fraction=1.0,
+        exploration_fraction=2.0,  # half of the decisions are still random at the end
         exploration_final_eps=0.05,
         policy_kwargs={"net_arch": [64, 64]},
         seed=options.seed,
