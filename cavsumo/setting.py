@@ -142,7 +142,12 @@ def checksums(plan: BatchPlan) -> dict[str, str]:
     """The SHA-256 of every file that a plan names."""
     scenario = plan.scenario
     files = [scenario.net, *([scenario.routes] if scenario.routes else []), *scenario.additional]
-    return {str(file): hashlib.sha256(file.read_bytes()).hexdigest() for file in files}
+    return {str(file): checksum(file) for file in files}
+
+
+def checksum(file: Path) -> str:
+    """The SHA-256 of a file."""
+    return hashlib.sha256(file.read_bytes()).hexdigest()
 
 
 def versions() -> dict[str, str]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import importlib
 import math
 import sys
@@ -17,12 +18,16 @@ from cavsumo.bodies import PEDESTRIAN, Body, Kind
 from cavsumo.cli import main
 from cavsumo.egos import make_ego
 from cavsumo.egos.base import EGO_KIND
+from cavsumo.jobs import job
 from cavsumo.paths import Path as Polyline
+from cavsumo.replays import Record
 from cavsumo.roads import Roads, Start
 from cavsumo.scenario import BatchPlan, plan_from
 from cavsumo.setting import Setting, checksums, prepare, versions
 from cavsumo.site import Site
 from cavsumo.snapshot import BodyState, Snapshot
+from cavsumo.theatre import Theatre
+from cavsumo.traces import Trace, parsed
 from cavsumo.world import World
 
 ROOT = Path(__file__).parents[1]
@@ -214,3 +219,13 @@ def _start(x: float, y: float, o: float, open_plane: bool) -> Start:
     along = pavement.project(x, y)
     forwards = math.cos(o - pavement.at(along.along)[2]) >= 0
     return Start(x, y, o, pavement, along.lateral, forwards)
+
+
+@pytest.fixture(scope="session")
+def shown(staged: Callable[..., tuple[BatchPlan, Site]]) -> tuple[Record, Trace, Site]:
+    """An episode at the Helsinki crossing in which the ego hits a tester, recorded."""
+    plan, site = staged("crossing", agents=["timing"], routes="auto")
+    with Theatre(plan, site) as theatre:
+        outcome, _ = theatre.play(dataclasses.replace(job(plan, 1), record=True))
+    trace = parsed(outcome.trace)
+    return Record(plan, trace.row, trace, trace.head, Path("results.csv")), trace, site
