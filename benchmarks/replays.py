@@ -4,8 +4,8 @@
 
 Batches are played into a temporary folder: pedestrians and cars, SUMO's driver and a controller, a
 learner, lights and drawn traffic, on the networks that come with cavsumo. Then rows are drawn
-from all of them, by an own generator, and each is played again in a process of its own and
-compared, bit for bit: half of them from their results, half from their traces alone.
+from all of them, by an own generator, and each is played again in another process and compared, bit
+for bit: half of them from their results, half from their traces alone.
 """
 
 from __future__ import annotations
@@ -24,7 +24,8 @@ from cavsumo.errors import DivergenceError
 from cavsumo.executors import Means
 from cavsumo.replays import compare, recorded, recorded_alone, replayed
 from cavsumo.results import read_rows
-from cavsumo.setting import Setting, prepare
+from cavsumo.setting import prepare
+from cavsumo.worker import Worker
 
 ROOT = Path(__file__).resolve().parent.parent
 LEARNING = "q-learning"  # replayed from the results, its every earlier episode is played again
@@ -56,14 +57,16 @@ def main() -> None:
                  for i, name in enumerate(BATCHES)}  # fmt: skip
         every = [(name, int(row["run"])) for name, file in files.items() for row in read_rows(file)]
         drawn = random.Random(options.seed).sample(every, options.replays)
-        settings: dict[tuple[str, bool], Setting] = {}
+        workers: dict[tuple[str, bool], Worker] = {}
         counts: Counter[tuple[str, str]] = Counter()
         begun = time.perf_counter()
         for i, (name, number) in enumerate(drawn):
-            what = again(name, files[name], number, bool(i % 2), settings)
+            what = again(name, files[name], number, bool(i % 2), workers)
             counts[name, what] += 1
             counts["all", what] += 1
         spent = time.perf_counter() - begun
+        for worker in workers.values():
+            worker.close()
     report(counts, options.replays, spent)
     sys.exit(any(what == "diverged" for _, what in counts))
 
@@ -78,16 +81,16 @@ def batch(name: str, options: argparse.Namespace, file: Path) -> Path:
 
 
 def again(
-    name: str, file: Path, number: int, alone: bool, settings: dict[tuple[str, bool], Setting]
+    name: str, file: Path, number: int, alone: bool, workers: dict[tuple[str, bool], Worker]
 ) -> str:
     """Replay a row: how it was replayed, or that it diverged."""
     record = recorded(file, number)
     if alone:
         record = recorded_alone(file.parent / record.row["trace"])
-    if (name, alone) not in settings:
-        settings[name, alone] = prepare(record.plan)
+    if (name, alone) not in workers:
+        workers[name, alone] = Worker(prepare(record.plan))
     try:
-        compare(record, replayed(settings[name, alone], record))
+        compare(record, replayed(workers[name, alone], record))
     except DivergenceError as error:
         print(f"{name}: {error}")
         return "diverged"

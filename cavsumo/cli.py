@@ -176,8 +176,19 @@ def _add_scenario(group: Any) -> None:
     )
     add("-a", "--additional-files", metavar="FILES", help="SUMO additional files, with commas")
     add("-c", "--config", metavar="FILE", help="scenario file (TOML)")
-    add("--ego", metavar="NAME", help="an ego by name (see cavsumo egos) or module:Class")
+    add(
+        "--ego",
+        metavar="NAME",
+        help="an ego by name, module:Class, exec:COMMAND, tcp:HOST:PORT; see cavsumo egos",
+    )
     add("--ego-param", action="append", metavar="KEY=VALUE", help="a parameter of the ego")
+    add(
+        "--ego-sensor",
+        action="append",
+        metavar="KEY=VALUE",
+        help="what the ego sees of others: range_m, position_noise_m, heading_noise_rad, "
+        "speed_noise_mps, delay_s, occlusion=true (default: everybody, exactly, at once)",
+    )
     add(
         "--ego-route",
         metavar="ROUTE",
@@ -204,6 +215,12 @@ def _add_testers(group: Any) -> None:
         action="append",
         metavar="KEY=VALUE",
         help="parameter of the agents that have it; AGENT.KEY=VALUE for one of them",
+    )
+    add(
+        "--tester-sensor",
+        action="append",
+        metavar="KEY=VALUE",
+        help="what the agents see of others, as --ego-sensor",
     )
     add("--kind", help="kind of body: pedestrian (default), car, bus or bicycle")
     add(

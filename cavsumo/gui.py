@@ -30,12 +30,15 @@ SHAPES = {"passenger": "passenger", "car": "passenger"}  # SUMO's names of what 
 VIEW = "View #0"
 ZOOM = 1500.0  # per cent; some 80 m across the window
 KEEP_EXACT = 2  # moveToXY: exactly there, on the network or off it
+DELAY_MOST = 60_000.0  # ms
 CONNECT_S = 60  # how long sumo-gui may take to start
 WAY = "cavsumo_way"  # a route that every vehicle is given; nobody follows it
 
 
-def check_gui() -> Path:
+def check_gui(delay_ms: float | None = None) -> Path:
     """sumo-gui's file; raises InputError in one sentence when it cannot be shown."""
+    if delay_ms is not None and not 0.0 <= delay_ms <= DELAY_MOST:
+        raise InputError(f"--delay must lie in [0, {DELAY_MOST:g}] ms, got {delay_ms:g}")
     if find_spec("sumo") is None or find_spec("traci") is None:
         raise InputError("--gui needs sumo-gui: pip install 'cavsumo[osm]'")
     program = sumo_home() / "bin" / "sumo-gui"

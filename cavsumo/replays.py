@@ -13,8 +13,8 @@ from cavsumo.errors import DivergenceError, InputError, ResultsError
 from cavsumo.jobs import Job, job, learners
 from cavsumo.outcomes import COLUMNS, Outcome, Row, cell
 from cavsumo.results import STARTING, read_manifest, read_rows
-from cavsumo.scenario import BatchPlan
-from cavsumo.setting import Setting, checksum
+from cavsumo.scenario import BatchPlan, Scenario
+from cavsumo.setting import checksum
 from cavsumo.traces import NOT_REPLAYED, Trace, read_trace
 from cavsumo.worker import Worker, search
 
@@ -129,7 +129,19 @@ def located(record: Record, net: Path | None, routes: Path | None) -> Record:
         here["routes"] = _file(record, "--routes", scenario.routes, routes)
     more = tuple(_file(record, "additional", file, None) for file in scenario.additional)
     moved = scenario.model_copy(update={**here, "additional": more})
-    return dataclasses.replace(record, plan=record.plan.model_copy(update={"scenario": moved}))
+    known = dict(record.origin.get("sha256") or {})
+    for was, now in zip(_files(scenario), _files(moved), strict=True):
+        known[str(now)] = known.pop(str(was))
+    return dataclasses.replace(
+        record,
+        plan=record.plan.model_copy(update={"scenario": moved}),
+        origin={**record.origin, "sha256": known},
+    )
+
+
+def _files(scenario: Scenario) -> list[Path]:
+    """The files that are looked for."""
+    return [f for f in (scenario.net, scenario.routes, *scenario.additional) if f is not None]
 
 
 def _file(record: Record, option: str, was: Path, given: Path | None) -> Path:
@@ -155,26 +167,25 @@ def _file(record: Record, option: str, was: Path, given: Path | None) -> Path:
 # Played again
 
 
-def replayed(setting: Setting, record: Record) -> Outcome:
+def replayed(worker: Worker, record: Record) -> Outcome:
     """An episode once more, with all that came before it and matters to it.
 
     Learners first live through their earlier episodes, or are told what they knew if a trace
     stands alone; an episode of a shared simulation comes after those before it.
     """
-    plan, run = setting.plan, record.run
-    with Worker(setting) as worker:
-        if record.alone and record.trace is not None:
-            row, memory = record.row, record.trace.head["memory"]
-            again = Job(run, row["agent"], int(row["seed"]), memory, record=True)
-            return worker.play(again)[0]
-        if record.row["reset"] == "shared":
-            first = run - run % plan.block
-            return search(worker, [job(plan, i) for i in range(first, run + 1)])[-1][0]
-        memory, step = None, len(plan.agents)
-        learns = job(plan, run).agent in learners(plan)
-        for earlier in range(run % step, run, step) if learns else ():
-            _, memory = worker.play(job(plan, earlier, memory))
-        return worker.play(dataclasses.replace(job(plan, run, memory), record=True))[0]
+    plan, run = worker.setting.plan, record.run
+    if record.alone and record.trace is not None:
+        row, memory = record.row, record.trace.head["memory"]
+        again = Job(run, row["agent"], int(row["seed"]), memory, record=True)
+        return worker.play(again)[0]
+    if record.row["reset"] == "shared":
+        first = run - run % plan.block
+        return search(worker, [job(plan, i) for i in range(first, run + 1)])[-1][0]
+    memory, step = None, len(plan.agents)
+    learns = job(plan, run).agent in learners(plan)
+    for earlier in range(run % step, run, step) if learns else ():
+        _, memory = worker.play(job(plan, earlier, memory))
+    return worker.play(dataclasses.replace(job(plan, run, memory), record=True))[0]
 
 
 # Compared

@@ -25,6 +25,11 @@ def trace_name(csv_file: Path, run: int) -> str:
     return f"{csv_file.stem}/run{run:06d}.jsonl"
 
 
+def ego_log_name(csv_file: Path, run: int) -> str:
+    """Where lies what the ego printed in an episode, relative to the results file."""
+    return f"{csv_file.stem}/run{run:06d}.ego.log"
+
+
 def read_manifest(csv_file: Path) -> dict[str, Any]:
     """The manifest that belongs to a results file."""
     file = csv_file.with_suffix(".json")

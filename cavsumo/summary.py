@@ -98,7 +98,7 @@ def _say_first(tally: Tally, csv_file: Path, console: Console) -> None:
             _say(
                 console,
                 f"first {what}: run {row['run']} ({row['agent']}): {event(row)}"
-                f"\n       cavsumo replay {csv_file} {row['run']}",
+                f"\n       cavsumo replay {csv_file} {row['run']} --html run{row['run']}.html",
             )
             return
 

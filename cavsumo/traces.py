@@ -21,7 +21,8 @@ from cavsumo.errors import ResultsError
 from cavsumo.options import OPTIONS
 from cavsumo.outcomes import COLUMNS, Row, cell
 from cavsumo.scenario import BatchPlan
-from cavsumo.setting import EXTENT, checksums, versions
+from cavsumo.setting import EXTENT, checksums, traffic_checksum, versions
+from cavsumo.site import Site
 from cavsumo.snapshot import BodyState, Snapshot
 
 FORMAT = "cavsumo-trace-1"
@@ -66,11 +67,11 @@ class Trace:
         }
 
 
-def origin(plan: BatchPlan) -> dict[str, Any]:
+def origin(plan: BatchPlan, site: Site) -> dict[str, Any]:
     """What the episodes of a plan have in common, for the heads of their traces."""
     return {
         "plan": plan.model_dump(mode="json", exclude=set(MANNER)),
-        "sha256": checksums(plan),
+        "sha256": checksums(plan) | traffic_checksum(site),
         "versions": versions(),
         "sumo_options": dict(OPTIONS),
     }

@@ -75,6 +75,13 @@ def test_without_sumo_gui_it_says_what_to_install(monkeypatch: pytest.MonkeyPatc
         check_gui()
 
 
+@pytest.mark.parametrize("delay", [-1.0, float("nan"), 1e6])
+def test_a_delay_that_is_none_is_refused(delay: float) -> None:
+    """Milliseconds, a minute at most."""
+    with pytest.raises(InputError, match=r"--delay must lie in"):
+        check_gui(delay)
+
+
 def test_the_command_has_the_network_and_begins_at_once() -> None:
     """Nothing is simulated but what is told, at the pace that was asked for."""
     words = command(Path("sumo-gui"), Path("a.net.xml"), Path("t.xml"), 0.1, 50.0, close=False)

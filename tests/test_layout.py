@@ -16,16 +16,17 @@ PACKAGE = Path(cavsumo.__file__).parent
 
 # From the ground up: a module uses only what stands before it, lazily or not.
 ORDER = """
-    cavsumo errors checks registry kinematics geometry paths bodies snapshot fairness roads
-    sumo_poses background
+    cavsumo errors checks registry processes kinematics geometry paths bodies snapshot fairness
+    roads sumo_poses background
     network ego_routes lane_chains approaches starts vehicle_starts kerbs signals trips traffic
-    site scene
+    site scene sight sensors
     osm handedness netconvert facts surfaces inspection layers picture
     agents.base agents.walking agents.driving agents.triggers agents.random agents.features
     agents.manoeuvres agents.behaviours agents.programmed agents.election agents.qlearning agents
     contacts
     assertions.base assertions.collision assertions.reaction_zone assertions
-    egos.base egos.constant egos.sumo egos.time_gap egos.controller egos
+    egos.base egos.constant egos.sumo egos.time_gap egos.effectors egos.controller
+    egos.protocol egos.link egos.child egos.wire egos.external egos.specs egos
     options scenario outcomes rewards sumo_types demand simulations world
     jobs stage simulator setting traces theatre worker_process worker batch executors
     statistics tally stopping results recorder learning progress session
@@ -43,7 +44,7 @@ ORDER = """
 """.split()
 
 HEAVY = {"numpy", "pandas", "scipy", "shapely", "libsumo", "sumolib", "pydantic", "rich"}
-HEAVY |= {"matplotlib", "osmium", "pyproj", "sumo"}
+HEAVY |= {"matplotlib", "osmium", "pyproj", "sumo", "jinja2", "traci"}
 
 
 def short(name: str) -> str:

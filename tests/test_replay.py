@@ -6,6 +6,7 @@ import copy
 import dataclasses
 import json
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -20,6 +21,7 @@ from cavsumo.executors import Means
 from cavsumo.outcomes import COLUMNS, Outcome
 from cavsumo.replays import Record, compare, located, recorded, recorded_alone, replayed
 from cavsumo.setting import prepare
+from cavsumo.worker import Worker
 
 Frames = list[dict[str, Any]]
 RUN = 1  # the episode that is played again
@@ -69,7 +71,8 @@ def recording(networks: dict[str, Path], tmp_path_factory: pytest.TempPathFactor
     settings = {"net": networks["crossing"], "agents": ["timing"], "runs": 2, "trace": "all"}
     run(settings, file, Means(), Manner(quiet=True, exit_zero=True))
     record = recorded(file, RUN)
-    return Recording(file, record, replayed(prepare(record.plan), record))
+    with Worker(prepare(record.plan)) as worker:
+        return Recording(file, record, replayed(worker, record))
 
 
 def test_a_recorded_episode_comes_out_the_same(recording: Recording) -> None:
@@ -259,6 +262,39 @@ def test_a_trace_of_something_else_is_refused(
     trace.write_bytes(trace.read_bytes() + line + b"\n")
     with pytest.raises(ResultsError, match="trace"):
         recorded(file, RUN)
+
+
+def test_an_error_is_replayed_and_cannot_be_shown(
+    networks: dict[str, Path],
+    tmp_path: Path,
+    controller: Callable[..., str],
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    """An episode in which the ego fails: the same error again, and no page of it."""
+    name = controller(
+        "class Ego:\n    def act(self, snapshot):\n        raise ValueError('lost')\n"
+    )
+    file = tmp_path / "results.csv"
+    settings = {"net": networks["pedestrians"], "ego": f"{name}:Ego", "runs": 1}
+    run(settings, file, Means(), Manner(quiet=True, exit_zero=True))
+    assert main(["replay", str(file), "0"]) == Exit.OK
+    assert "run 0 (timing): error, its row" in capsys.readouterr().out
+    page = tmp_path / "page.html"
+    assert main(["replay", str(file), "0", "--html", str(page)]) == Exit.USAGE
+    assert "ended in an error" in capsys.readouterr().err
+    assert not page.exists()
+
+
+def test_what_was_recorded_is_shown_without_playing(
+    recording: Recording, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """The page of a record that could not come out the same any more; it says so."""
+    file, page = _sent(recording, tmp_path), tmp_path / "page.html"
+    text = file.read_text(encoding="utf-8").replace('"libsumo": "', '"libsumo": "0.')
+    file.write_text(text.replace('"lights": ""', '"lights": "r"'), encoding="utf-8")
+    assert main(["replay", str(file), "--recorded", "--html", str(page)]) == Exit.OK
+    assert "as recorded" in capsys.readouterr().out
+    assert page.read_text(encoding="utf-8").startswith("<!doctype html>")
 
 
 # A trace alone

@@ -11,6 +11,7 @@ from cavsumo.fcd import write_fcd
 from cavsumo.replays import Record, compare, located, recorded, recorded_alone, replayed
 from cavsumo.setting import Setting, changes, manifest, prepare
 from cavsumo.traces import Trace, parsed
+from cavsumo.worker import Worker
 
 TRACE = ".jsonl"  # how the name of a trace ends
 
@@ -36,6 +37,11 @@ class Wanted:
     gui: bool = False
     delay: float | None = None
 
+    @property
+    def shown(self) -> bool:
+        """Whether the trace is of any use."""
+        return bool(self.html or self.fcd or self.gui)
+
 
 def replay(file: Path, wanted: Wanted = Wanted()) -> int:
     """Play an episode again and show it; raises DivergenceError where it first differs."""
@@ -45,11 +51,14 @@ def replay(file: Path, wanted: Wanted = Wanted()) -> int:
     if wanted.gui:
         from cavsumo.gui import check_gui
 
-        check_gui()
+        check_gui(wanted.delay)
     record = _record(file, wanted)
     setting = prepare(record.plan)
-    trace = _recorded_trace(record) if wanted.recorded else _played(setting, record, wanted)
-    _show(setting, record, trace, wanted)
+    trace = _recorded_trace(record) if wanted.recorded else _played(setting, record)
+    if wanted.shown and trace is None:
+        raise InputError(f"replay: run {record.run} ended in an error, there is nothing to show")
+    if trace is not None:
+        _show(setting, record, trace, wanted)
     return Exit.OK
 
 
@@ -75,20 +84,18 @@ def _recorded_trace(record: Record) -> Trace:
     return record.trace
 
 
-def _played(setting: Setting, record: Record, wanted: Wanted) -> Trace:
-    """The trace of the episode played again, which is the recorded one."""
-    now = manifest(setting)
-    moved = record.alone or wanted.net or wanted.routes  # its files were checked already
-    was = {**record.origin, "sha256": now["sha256"]} if moved else record.origin
-    for change in changes(was, now):
+def _played(setting: Setting, record: Record) -> Trace | None:
+    """The trace of the episode played again, the recorded one; None where an error left none."""
+    for change in changes(record.origin, manifest(setting)):
         print(f"cavsumo: {change}", file=sys.stderr)
-    again = replayed(setting, record)
+    with Worker(setting) as worker:
+        again = replayed(worker, record)
     compare(record, again)
     frames = record.trace.frames if record.trace is not None else None
     compared = f"{len(frames)} frames" if frames is not None else "its row (no trace was kept)"
     row = record.row
     print(f"run {record.run} ({row['agent']}): {row['outcome']}, {compared}: the same")
-    return parsed(again.trace)
+    return parsed(again.trace) if again.trace else None
 
 
 def _show(setting: Setting, record: Record, trace: Trace, wanted: Wanted) -> None:

@@ -82,9 +82,10 @@
 
   const map = $("map");
   const pen = map.getContext("2d");
-  let colours = {};
+  let colours = {}, scheme = 0; // and how often they have changed
 
   function readColours() {
+    scheme += 1;
     const style = getComputedStyle(document.documentElement);
     const names = ("ground road other pavement walking line stripes borders route ego tester vehicle pedestrian " +
       "glass braking reaction outline red yellow green ink soft edge panel accent").split(" ");
@@ -144,19 +145,34 @@
     map.height / 2 - (y - drawn.cy) * drawn.scale,
   ];
 
-  function worldPen() {
+  function worldPen(pen) {
     const s = drawn.scale;
     pen.setTransform(s, 0, 0, -s, map.width / 2 - drawn.cx * s, map.height / 2 + drawn.cy * s);
   }
 
   // Drawing
 
-  function drawScene() {
+  const still = {}; // pictures of what stands still, by name
+
+  function backdrop(name, pen, key, paint) { // paints it only when its key changes
+    const { width, height } = pen.canvas, whole = [width, height, scheme, ...key].join(" ");
+    const it = (still[name] ||= { canvas: document.createElement("canvas") });
+    if (it.key !== whole) {
+      Object.assign(it, { key: whole });
+      Object.assign(it.canvas, { width, height });
+      paint(it.canvas.getContext("2d"));
+    }
+    pen.setTransform(1, 0, 0, 1, 0, 0);
+    pen.clearRect(0, 0, width, height);
+    pen.drawImage(it.canvas, 0, 0);
+  }
+
+  function drawScene(pen) {
     const pixel = (window.devicePixelRatio || 1) / drawn.scale; // m
     pen.setTransform(1, 0, 0, 1, 0, 0);
     pen.fillStyle = colours.ground;
     pen.fillRect(0, 0, map.width, map.height);
-    worldPen();
+    worldPen(pen);
     pen.lineJoin = "round";
     for (const name of ["pavement", "other", "road", "walking"]) {
       pen.fillStyle = pen.strokeStyle = colours[name];
@@ -359,7 +375,9 @@
   function draw() {
     const begun = performance.now(), frame = frameNow();
     look();
-    drawScene();
+    if (state.follow && state.playing) drawScene(pen);
+    else backdrop("scene", pen, [drawn.scale, drawn.cx, drawn.cy], drawScene);
+    worldPen(pen);
     drawLights(frame);
     for (const body of bodies) if (body.part !== "background") drawWay(body);
     drawZones(frame);
@@ -381,15 +399,16 @@
 
   // Graphs
 
-  const nice = (most) => {
+  const nice = (most, steps = [1, 2, 5, 10]) => { // the next round number
     const unit = 10 ** Math.floor(Math.log10(Math.max(most, 1e-3)));
-    return [1, 2, 5, 10].map((k) => k * unit).find((v) => v >= most - 1e-9);
+    return steps.map((k) => k * unit).find((v) => v >= most - 1e-9);
   };
-  const most = (values, limit) => Math.min(limit, nice(values.reduce((a, v) => (v > a ? v : a), 0.5)));
+  const most = (values, limit) =>
+    Math.min(limit, nice(values.reduce((a, v) => (v > a ? v : a), 0.5), [1, 1.2, 1.6, 2, 3, 4, 6, 8, 10]));
   const graphs = [
     { name: "speed", unit: "m/s", top: most(curves.speed, 100), colour: "ego" },
     { name: "gap", unit: "m", top: most(curves.gap, GAP_MOST), colour: "tester" },
-    { name: "ttc", unit: "s", top: most(curves.ttc, TTC_MOST), colour: "braking" },
+    { name: "ttc", unit: "s", top: most(curves.ttc, TTC_MOST), colour: "pedestrian" },
   ].map((graph) => ({ ...graph, canvas: $(`${graph.name}-graph`), values: curves[graph.name] }));
 
   function frameOf(graph) { // the plot's edges in device pixels
@@ -401,7 +420,21 @@
     const ink = graph.canvas.getContext("2d"), box = frameOf(graph), { ratio } = box;
     const x = (i) => box.left + (box.right - box.left) * (last ? i / last : 0);
     const y = (v) => box.bottom - (box.bottom - box.top) * Math.min(v, graph.top) / graph.top;
-    ink.clearRect(0, 0, graph.canvas.width, graph.canvas.height);
+    backdrop(graph.name, ink, [], (pen) => drawPlot(pen, graph, box, x, y));
+    const now = x(state.time), v = graph.values[frameNow()];
+    ink.strokeStyle = colours.ink;
+    ink.lineWidth = 1.2 * ratio;
+    line(ink, now, box.top - 4 * ratio, now, box.bottom);
+    if (v >= 0 && v <= graph.top) {
+      ink.fillStyle = colours[graph.colour];
+      ink.beginPath();
+      ink.arc(now, y(v), 3.6 * ratio, 0, 2 * Math.PI);
+      ink.fill();
+    }
+  }
+
+  function drawPlot(ink, graph, box, x, y) { // axes, marks and the curve
+    const { ratio } = box;
     ink.font = `${10.5 * ratio}px system-ui, sans-serif`;
     ink.lineWidth = ratio;
     ink.strokeStyle = colours.edge;
@@ -430,16 +463,6 @@
       ink.setLineDash([]);
     }
     drawCurve(ink, graph, x, y, ratio);
-    const now = x(state.time), v = graph.values[frameNow()];
-    ink.strokeStyle = colours.ink;
-    ink.lineWidth = 1.2 * ratio;
-    line(ink, now, box.top - 4 * ratio, now, box.bottom);
-    if (v >= 0 && v <= graph.top) {
-      ink.fillStyle = colours[graph.colour];
-      ink.beginPath();
-      ink.arc(now, y(v), 3.6 * ratio, 0, 2 * Math.PI);
-      ink.fill();
-    }
   }
 
   function drawCurve(ink, graph, x, y, ratio) {

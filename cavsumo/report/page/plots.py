@@ -68,7 +68,8 @@ def share_bar(label: str, share: Share, text: str) -> Bar:
 
 def ratio_bar(label: str, one: Comparison, text: str) -> Bar:
     """A ratio of rates."""
-    return Bar(label, one.ratio, *(one.interval or (None, None)), text)
+    low, high = one.interval or (None, None)
+    return Bar(label, one.ratio, low, high, text)
 
 
 def shares_plot(bars: Sequence[Bar], unit: str) -> str:
@@ -136,7 +137,8 @@ def survival_plot(curves: Sequence[Curve], name: str) -> str:
 
 def _style(name: str) -> Any:
     """The style for a plot, whose name sets its parts apart from those of others on the page."""
-    return rc_context(STYLE | {"svg.hashsalt": name})
+    settings: Any = STYLE | {"svg.hashsalt": name}
+    return rc_context(settings)
 
 
 def _lines(bars: Sequence[Bar]) -> tuple[Figure, Axes]:
