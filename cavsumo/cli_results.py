@@ -68,7 +68,7 @@ def add_report(commands: Any) -> None:
         type=int,
         default=20,
         metavar="N",
-        help="of --html: so many failures, and a quarter as many passed tests, as pages that play "
+        help="of --html: so many failures, and half as many passed tests, as pages that play "
         "them, in a folder beside it (default 20)",
     )
     report.set_defaults(command=_report)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -11,9 +12,8 @@ from markupsafe import Markup
 
 from cavsumo.pages.shell import render, write
 from cavsumo.report.analysis import Report
-from cavsumo.report.compare import EVENTS
+from cavsumo.report.compare import EVENTS, Comparison
 from cavsumo.report.page import words
-from cavsumo.report.page.links import SHARE as FAILURES_A_TEST
 from cavsumo.report.page.links import Look, chosen, with_pages, write_pages
 from cavsumo.report.page.places import MEANING, Map, maps
 from cavsumo.report.page.plots import (
@@ -55,12 +55,12 @@ def write_report(report: Report, file: Path, replays: int) -> None:
 
     Args:
         replays: how many failures are shown as pages of their own; of the tests that the ego
-            passed a quarter as many.
+            passed half as many.
     """
     played = scenes(report.evidence.batches)
     failures, tests = chosen(report, replays)
     failures = with_pages(failures, replays, report, played)
-    tests = with_pages(tests, replays // FAILURES_A_TEST, report, played)
+    tests = with_pages(tests, replays // 2, report, played)
     folder = file.parent / f"{file.stem}_replays"
     text = page(report, played, failures, tests, folder.name)
     write_pages([*failures, *tests], report.evidence.batches, played, folder)
@@ -82,6 +82,7 @@ def page(
         FILES,
         "report",
         title=words.title(report),
+        headline=words.headline(report),
         answers=words.answers(report),
         certainty=words.certainty(report),
         excluded=words.excluded(report),
@@ -108,10 +109,10 @@ def _shares(report: Report) -> Iterator[Plot]:
         bars = []
         for one in report.rates[:LINES]:
             share: Share = getattr(one, what)
-            text = f"{share.count}/{share.total}  {percent(share.value)}"
+            text = percent(share.value)
             bars.append(share_bar(words.label(one, report.by), share, text))
         if bars:
-            yield _plot(f"{title}, {OF[what]}", shares_plot, bars, what, len(report.rates))
+            yield _plot(f"{title}, {OF[what]}", shares_plot, bars, len(report.rates))
 
 
 def _ratios(report: Report) -> Iterator[Plot]:
@@ -120,21 +121,27 @@ def _ratios(report: Report) -> Iterator[Plot]:
         found = [one for one in report.comparisons if one.event == what]
         bars = []
         for one in found[:LINES]:
-            where = [word for word in (one.agent, one.setting) if word]
-            name = " · ".join((f"{one.first or '(none)'} : {one.second or '(none)'}", *where))
-            bars.append(ratio_bar(name, one, "" if one.ratio is None else number(one.ratio)))
+            where = [word for word in (one.setting, one.agent) if word]
+            name = " · ".join((*where, f"{one.first or '(none)'} : {one.second or '(none)'}"))
+            bars.append(ratio_bar(name, one, _ratio(one)))
         if bars:
-            yield _plot(
-                f"{what.capitalize()}: ratio of the rates", ratios_plot, bars, what, len(found)
-            )
+            title = f"{what.capitalize()}: how many times as often"
+            yield _plot(title, ratios_plot, bars, len(found))
 
 
 def _plot(
-    title: str, draw: Callable[[Sequence[Any], str], str], bars: Sequence[Any], unit: str, all_: int
+    title: str, draw: Callable[[Sequence[Any], str], str], bars: Sequence[Any], total: int
 ) -> Plot:
     """A plot of bars; says how many are left out."""
-    note = f"{all_ - len(bars)} more are in the table." if all_ > len(bars) else ""
-    return Plot(title, Markup(draw(bars, f"{title} {unit}")), note=note)
+    note = f"{total - len(bars)} more are in the table." if total > len(bars) else ""
+    return Plot(title, Markup(draw(bars, title)), note=note)
+
+
+def _ratio(one: Comparison) -> str:
+    """The ratio beside its bar."""
+    if one.ratio is None:
+        return "none found"
+    return number(one.ratio) if math.isfinite(one.ratio) else "∞"
 
 
 def _curves(report: Report) -> Iterator[Plot]:
@@ -166,4 +173,4 @@ def _drawn(one: Map, report: Report, looks: Sequence[Look]) -> dict[str, Any]:
         radius = round(one.radius * min(4.0, dot.many**0.5), 2)
         single = pages.get(dot.run, "") if dot.many == 1 else ""
         dots.append((dot, radius, f"{who}, {many}: {MEANING[dot.sort]}", single))
-    return {"map": one, "dots": dots}
+    return {"map": one, "dots": dots, "wide": round(600 * one.width / one.height)}

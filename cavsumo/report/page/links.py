@@ -22,8 +22,8 @@ from cavsumo.report.page.scenes import Scene
 from cavsumo.results import whole_lines
 from cavsumo.traces import read_trace
 
-FAILURES, TESTS = 50, 10  # are listed, or as many as are wanted as pages
-SHARE = 4  # a page of a test that the ego passed for so many of failures
+FAILURES = 50  # are listed at most, or as many as are wanted as pages
+TESTS = 10  # passed tests are listed if none is wanted as a page
 
 
 @dataclass(frozen=True)
@@ -64,7 +64,7 @@ def chosen(report: Report, pages: int) -> tuple[list[Look], list[Look]]:
     keys = list(zip(failures["file"], failures["run"], strict=True))
     order = sorted(range(len(keys)), key=lambda i: (firsts.get(keys[i], len(firsts)), i))
     picked = failures.iloc[order[: max(FAILURES, pages)]]
-    spread = np.linspace(0, len(tests) - 1, min(len(tests), max(TESTS, pages // SHARE)))
+    spread = np.linspace(0, len(tests) - 1, min(len(tests), pages // 2 or TESTS))
     return (
         _looks(report, picked, settings, alike),
         _looks(report, tests.iloc[np.round(spread).astype(int)], settings, {}),

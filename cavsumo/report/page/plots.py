@@ -23,8 +23,8 @@ from cavsumo.report.compare import Comparison
 from cavsumo.report.rates import Share
 from cavsumo.report.survival import Curve
 
-WIDTH_IN = 4.4  # as narrow as a phone, so that text is as large there as elsewhere
-ROW_IN, FRAME_IN = 0.27, 0.55  # height of a line of bars, and of what is around them
+WIDTH_IN = 3.6  # as narrow as a phone, so that text is as large there as elsewhere
+ROW_IN, FRAME_IN = 0.26, 0.3  # height of a line of bars, and of what is around them
 LABEL = 26  # letters of a name beside an axis
 INK, SOFT, EDGE = "#010201", "#010202", "#010203"
 SERIES = [f"#0103{i:02x}" for i in range(8)]
@@ -72,24 +72,23 @@ def ratio_bar(label: str, one: Comparison, text: str) -> Bar:
     return Bar(label, one.ratio, low, high, text)
 
 
-def shares_plot(bars: Sequence[Bar], unit: str) -> str:
+def shares_plot(bars: Sequence[Bar], name: str) -> str:
     """Shares from 0 to as far as they go, one line each; the dot is the share."""
-    with _style(unit):
+    with _style(name):
         figure, axes = _lines(bars)
         ends = [end for bar in bars for end in (bar.high, bar.value) if end is not None]
         limit = min(1.0, 1.1 * max(ends, default=1.0)) or 1.0
         for i, bar in enumerate(bars):
-            _interval(axes, i, bar, bar.low, bar.high)
+            _interval(axes, i, bar, (0.0, limit))
             if bar.value is not None:
                 axes.barh(i, bar.value, height=0.5, color=SERIES[0], alpha=0.22, lw=0)
         axes.set_xlim(0.0, limit)
         axes.xaxis.set_major_locator(MaxNLocator(5))
         axes.xaxis.set_major_formatter(lambda x, _: f"{100 * x:.3g} %")
-        axes.set_xlabel(unit)
         return _svg(figure)
 
 
-def ratios_plot(bars: Sequence[Bar], unit: str) -> str:
+def ratios_plot(bars: Sequence[Bar], name: str) -> str:
     """Ratios on a logarithmic axis with 1 in it; an end without a bound goes to the frame."""
     finite = [
         value
@@ -98,25 +97,23 @@ def ratios_plot(bars: Sequence[Bar], unit: str) -> str:
         if value is not None and math.isfinite(value) and value > 0
     ]
     low, high = min([0.5, *finite]) / 1.25, max([2.0, *finite]) * 1.25
-    with _style(unit):
+    with _style(name):
         figure, axes = _lines(bars)
         axes.set_xscale("log")
         axes.set_xlim(low, high)
         axes.axvline(1.0, color=SOFT, lw=1.0, ls=(0, (3, 2)))
         for i, bar in enumerate(bars):
-            ends = [None if e is None else min(max(e, low), high) for e in (bar.low, bar.high)]
             inside = bar.value is not None and low <= bar.value <= high
-            _interval(axes, i, bar if inside else bar._replace(value=None), *ends)
+            _interval(axes, i, bar if inside else bar._replace(value=None), (low, high))
         axes.xaxis.set_major_formatter(lambda x, _: f"{x:g}")
         axes.xaxis.set_minor_formatter(lambda x, _: "")
-        axes.set_xlabel(unit)
         return _svg(figure)
 
 
 def survival_plot(curves: Sequence[Curve], name: str) -> str:
     """The share of episodes without a test so far, with its bands [s]."""
     with _style(name):
-        figure = Figure(figsize=(WIDTH_IN, 2.9), layout="constrained")
+        figure = Figure(figsize=(WIDTH_IN, 2.5), layout="constrained")
         axes = figure.add_subplot()
         for i, curve in enumerate(curves):
             colour, dash = SERIES[i % len(SERIES)], DASHES[i % len(DASHES)]
@@ -153,16 +150,20 @@ def _lines(bars: Sequence[Bar]) -> tuple[Figure, Axes]:
     beside.spines["right"].set_visible(False)
     beside.patch.set_visible(False)
     _plain(axes)
-    axes.tick_params(axis="y", length=0)
+    axes.tick_params(axis="y", length=0, pad=7)
     axes.grid(visible=True, axis="x")
     return figure, axes
 
 
-def _interval(axes: Axes, i: int, bar: Bar, low: float | None, high: float | None) -> None:
-    """One line: the interval with a dot at the figure."""
-    if low is not None and high is not None:
-        axes.plot([low, high], [i, i], color=SERIES[0], lw=2.0, solid_capstyle="butt")
-        axes.plot([low, high], [i, i], ls="", marker="|", ms=7, color=SERIES[0])
+def _interval(axes: Axes, i: int, bar: Bar, frame: tuple[float, float]) -> None:
+    """One line: the interval with a dot at the figure, an arrow where it leaves the frame."""
+    if bar.low is not None and bar.high is not None:
+        for end, mark in ((bar.low, 4), (bar.high, 5)):  # matplotlib's carets to left and right
+            inside = frame[0] <= end <= frame[1]
+            at = min(max(end, frame[0]), frame[1])
+            axes.plot([at], [i], ls="", marker="|" if inside else mark, ms=7, color=SERIES[0])
+        ends = max(bar.low, frame[0]), min(bar.high, frame[1])
+        axes.plot(ends, [i, i], color=SERIES[0], lw=2.0, solid_capstyle="butt")
     if bar.value is not None:
         axes.plot([bar.value], [i], ls="", marker="o", ms=5.5, color=SERIES[0], clip_on=False)
 

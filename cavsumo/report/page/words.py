@@ -26,10 +26,22 @@ def title(report: Report) -> str:
     return "Report: " + _listed(shown)
 
 
+def headline(report: Report) -> str:
+    """What was tested against what, in a line."""
+    batches = report.evidence.batches
+    egos = list(dict.fromkeys(_ego(batch.plan.scenario) for batch in batches))
+    testers = list(dict.fromkeys(_testers(batch.plan.scenario) for batch in batches))
+    seeds = list(dict.fromkeys(str(batch.plan.seed) for batch in batches))
+    ego = egos[0] if len(egos) == 1 else f"{len(egos)} egos"
+    seed = f"seed {seeds[0]}" if len(seeds) == 1 else f"{len(seeds)} seeds"
+    episodes = _many(len(report.evidence.rows), "episode")
+    return f"Ego: {ego}. Testers: {_listed(testers[:3])}. {episodes}, {seed}."
+
+
 def label(told: Told, by: str) -> str:
     """A group in a word or two."""
     words = [told.agent] if by == "agent" else [told.agent, f"{by} {told.value or '(none)'}"]
-    return " · ".join([*words, *([told.setting] if told.setting else [])])
+    return " · ".join([*([told.setting] if told.setting else []), *words])
 
 
 def answers(report: Report) -> list[str]:
@@ -46,12 +58,12 @@ def answer(one: Rates, who: str) -> str:
     if not tests.total:
         return f"{who} played no valid episode."
     if not tests.count:
-        return f"{who} found no test in {_many(tests.total, 'episode')} ({_at_most(tests)})."
+        return f"{who} found no test in {_many(tests.total, 'episode')}, {_share(tests)}."
     found = f"{who} found {_many(tests.count, 'test')} in {_many(tests.total, 'episode')}"
     found += f", {_share(tests)}"
     if not failures.count:
         passed = "it" if tests.count == 1 else "all of them"
-        return f"{found}; the ego passed {passed} (it fails {_at_most(failures)})."
+        return f"{found}; the ego passed {passed}: it failed {_share(failures)}."
     of = "it" if tests.count == 1 else f"{failures.count} of them"
     return f"{found}; the ego failed {of}, {_share(failures)}."
 
@@ -96,7 +108,7 @@ def facts(batch: Batch, episodes: int) -> Facts:
         ("Ego", _ego(scenario)),
         ("Tester agents", ", ".join(plan.agents)),
         ("Parameters", " ".join(f"{k}={v}" for k, v in plan.params.items())),
-        ("Testers", f"{scenario.testers} x {scenario.kind}"),
+        ("Testers", _testers(scenario)),
         ("Asserted", ", ".join(scenario.assertions)),
         ("Episodes", f"{episodes} of {plan.size}, {manifest.get('status', '')}"),
         ("Seed of the batch", str(plan.seed)),
@@ -118,6 +130,11 @@ def command(batch: Batch) -> str:
     return shlex.join(map(str, words)) if isinstance(words, list) else ""
 
 
+def _testers(scenario: Scenario) -> str:
+    """How many of which kind."""
+    return f"{scenario.testers} x {scenario.kind}"
+
+
 def _ego(scenario: Scenario) -> str:
     """The ego; one that cannot be loaded here by what was said of it."""
     try:
@@ -134,12 +151,6 @@ def _pairs(found: object) -> str:
 def _share(share: Share) -> str:
     """A share with its first interval."""
     return f"{percent(share.value)} {interval(next(iter(share.intervals.values())))}"
-
-
-def _at_most(share: Share) -> str:
-    """The upper end of the interval of a share of none."""
-    high = next(iter(share.intervals.values())).high
-    return f"at most {percent(1.0 if high is None else high)}, with 95 %"
 
 
 def _many(count: int, what: str) -> str:
