@@ -23,7 +23,7 @@ from cavsumo.egos import make_ego
 from cavsumo.egos.base import Ego
 from cavsumo.egos.specs import ego_files
 from cavsumo.errors import InputError
-from cavsumo.jobs import check_agents, learners, make_agents
+from cavsumo.jobs import check_agents, learners, make_agents, policy_files
 from cavsumo.options import OPTIONS
 from cavsumo.scenario import BatchPlan
 from cavsumo.signals import Pace
@@ -66,8 +66,11 @@ class Setting:
             raise InputError(f"{name} is {here} in the process that simulates, expected {there}")
 
 
-def prepare(plan: BatchPlan) -> Setting:
-    """Check every name and parameter of a plan and derive its site; raises InputError."""
+def prepare(plan: BatchPlan, ego: Ego | None = None) -> Setting:
+    """Check every name and parameter of a plan and derive its site; raises InputError.
+
+    ``ego`` drives instead of the one that the plan names.
+    """
     scenario = plan.scenario
     check_agents(plan)
     for name in scenario.assertions:
@@ -80,7 +83,7 @@ def prepare(plan: BatchPlan) -> Setting:
             f"{what}: {' and '.join(sorted(learners(plan)))} learns from episode to episode, in "
             "sequence; learn=false plays what was learned"
         )
-    ego = make_ego(scenario.ego, scenario.ego_params)
+    ego = ego or make_ego(scenario.ego, scenario.ego_params)
     if scenario.ego_sensor and type(ego).act is Ego.act:
         raise InputError(
             f"ego_sensor: ego {scenario.ego} is driven by SUMO, which sees everybody; a sensor "
@@ -148,6 +151,7 @@ def checksums(plan: BatchPlan) -> dict[str, str]:
     """The SHA-256 of every file that a plan names, its ego's among them."""
     scenario = plan.scenario
     files = [scenario.net, *([scenario.routes] if scenario.routes else []), *scenario.additional]
+    files += policy_files(plan)
     return {str(file): checksum(file) for file in (*files, *ego_files(scenario.ego))}
 
 

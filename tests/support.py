@@ -12,6 +12,9 @@ from cavsumo.results import read_rows
 from cavsumo.setting import Setting
 
 PATIENCE_S = 60.0
+# Settings of a short environment on the straight road.
+STRAIGHT_NET = str(Path(__file__).parents[1] / "networks" / "pedestrians.net.xml")
+SHORT = {"net": STRAIGHT_NET, "routes": "none", "end": 6.0}
 
 
 def rows(file: Path) -> list[dict[str, str]]:
