@@ -17,6 +17,7 @@ from cavsumo.report.rates import EXACT, SEQUENTIAL, WILSON, Rates, Share
 from cavsumo.report.survival import TimeToTest
 from cavsumo.summary import interval, percent
 
+TOPICS = ("results", "shares", "pairs", "times", "effort", "distinct")
 SHOWN = 10  # cells of failures
 
 
@@ -25,13 +26,13 @@ class Table:
     """A table of text.
 
     Attributes:
-        topic: what it belongs to: results, shares, pairs, times, effort, distinct.
+        topic: what it belongs to, one of ``TOPICS``.
         title: what it tells.
         words: the titles of its first columns, which hold words and stand to the left.
         numbers: the titles of the others, which hold numbers and stand to the right.
         rows: one cell a column.
         heads: in how many of the first columns words that repeat those above may be left out.
-        topic: what it belongs to: results, shares, pairs, times, effort, distinct.
+        topic: what it belongs to, one of ``TOPICS``.
         notes: what one must know to read it, a sentence each.
     """
 

@@ -28,7 +28,7 @@ from cavsumo.report.page.plots import (
 from cavsumo.report.page.scenes import Scene, scenes
 from cavsumo.report.rates import Share
 from cavsumo.report.survival import Curve
-from cavsumo.report.tables import number, tables
+from cavsumo.report.tables import TOPICS, Table, number, tables
 from cavsumo.summary import percent
 
 FILES = Path(__file__).parent
@@ -75,9 +75,9 @@ def page(
     folder: str,
 ) -> str:
     """The page, with links into a folder of replays."""
-    found: dict[str, list[Any]] = {}
+    found: dict[str, list[Table]] = {topic: [] for topic in TOPICS}
     for table in tables(report):
-        found.setdefault(table.topic, []).append(table)
+        found[table.topic].append(table)
     return render(
         FILES,
         "report",
@@ -86,6 +86,7 @@ def page(
         answers=words.answers(report),
         certainty=words.certainty(report),
         excluded=words.excluded(report),
+        errors=words.errors(report),
         batches=list(words.told_batches(report)),
         tables=found,
         labels=[words.label(group, report.by) for group in report.groups],

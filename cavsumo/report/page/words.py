@@ -15,6 +15,7 @@ from cavsumo.scenario import Scenario
 from cavsumo.summary import interval, percent
 
 ANSWERS = 12  # groups that are told in a sentence each
+ERRORS = 5  # that are quoted
 BATCHES = 6  # results that are told in full
 Facts = list[tuple[str, str]]
 
@@ -44,9 +45,14 @@ def label(told: Told, by: str) -> str:
     return " · ".join([*([told.setting] if told.setting else []), *words])
 
 
+def _who(told: Told, by: str) -> str:
+    """A group as the subject of a sentence."""
+    return label(told, by).replace(" · ", ": ", 1) if told.setting else label(told, by)
+
+
 def answers(report: Report) -> list[str]:
     """What each group found, the answer first."""
-    found = [answer(one, label(one, report.by)) for one in report.rates[:ANSWERS]]
+    found = [answer(one, _who(one, report.by)) for one in report.rates[:ANSWERS]]
     if len(report.rates) > ANSWERS:
         found.append(f"{len(report.rates) - ANSWERS} more groups are in the table.")
     return found or ["The results hold no episodes yet."]
@@ -96,6 +102,13 @@ def excluded(report: Report) -> str:
     if missing:
         return f"{said}. {missing} could not be played (errors) and are left out."
     return f"{said}. Every episode could be played."
+
+
+def errors(report: Report) -> list[str]:
+    """The first messages of episodes that could not be played."""
+    rows = report.evidence.rows
+    failed = rows[rows["outcome"] == "error"].head(ERRORS)
+    return [f"{row.file} run {row.run}: {row.error}" for row in failed.itertuples()]
 
 
 def facts(batch: Batch, episodes: int) -> Facts:
@@ -150,7 +163,8 @@ def _pairs(found: object) -> str:
 
 def _share(share: Share) -> str:
     """A share with its first interval."""
-    return f"{percent(share.value)} {interval(next(iter(share.intervals.values())))}"
+    found = f"{percent(share.value)} {interval(next(iter(share.intervals.values())))}"
+    return found.replace(" ", "\N{NO-BREAK SPACE}")
 
 
 def _many(count: int, what: str) -> str:
