@@ -143,7 +143,7 @@ def train(options: argparse.Namespace) -> Curve:
         n_steps=3,
         train_freq=2,
         target_update_interval=500,
-        exploration_fraction=2.0,  # half of the decisions are still random at the end
+        exploration_fraction=0.8,
         exploration_final_eps=0.05,
         policy_kwargs={"net_arch": [64, 64]},
         seed=options.seed,
@@ -187,8 +187,8 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0] if __doc__ else "")
     parser.add_argument("--net", type=Path, required=True, help="SUMO network")
     parser.add_argument("-o", "--output", type=Path, default=Path("tester.npz"), metavar="FILE")
-    parser.add_argument("--decisions", type=int, default=8_000, help="how long to train")
-    parser.add_argument("--every", type=int, default=2_000, help="decisions between evaluations")
+    parser.add_argument("--decisions", type=int, default=20_000, help="how long to train")
+    parser.add_argument("--every", type=int, default=4_000, help="decisions between evaluations")
     parser.add_argument("--evaluations", type=int, default=40, help="episodes of an evaluation")
     parser.add_argument("--seed", type=int, default=1, help="of the training")
     options = parser.parse_args()
