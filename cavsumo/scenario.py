@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 import tomllib
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -23,6 +23,7 @@ from pydantic import (
 
 from cavsumo.checks import densities
 from cavsumo.errors import InputError, UnknownName
+from cavsumo.labels import cast_of
 
 SHARED_BY = 25  # episodes that share one simulation when asked to
 Finite = Annotated[float, Field(allow_inf_nan=False)]
@@ -113,7 +114,9 @@ class BatchPlan(BaseModel):
     model_config = ConfigDict(extra="forbid", frozen=True)
 
     scenario: Scenario
-    agents: tuple[str, ...] = Field(("timing",), min_length=1)
+    agents: tuple[str, ...] = Field(
+        ("timing",), min_length=1, description="names of agents, or LABEL=NAME"
+    )
     params: Params = Field(default_factory=dict)
     runs: int = Field(100, ge=1, le=10_000_000)
     seed: int = Field(1, ge=0, le=2**63 - 1)
@@ -148,6 +151,17 @@ class BatchPlan(BaseModel):
             part_of(value) if info.field_name == "shard" else half_width(value)
         return value
 
+    @field_validator("agents")
+    @classmethod
+    def _told_apart(cls, value: tuple[str, ...]) -> tuple[str, ...]:
+        cast_of(value)
+        return value
+
+    @property
+    def cast(self) -> dict[str, str]:
+        """The names of the agents by their labels, in the order in which they take turns."""
+        return cast_of(self.agents)
+
     @property
     def block(self) -> int:
         """How many episodes in a row share one simulation, and are played by one process."""
@@ -169,10 +183,10 @@ class BatchPlan(BaseModel):
         """How many episodes that are."""
         return self.runs * len(self.agents) if self.shard is None else sum(1 for _ in self.todo())
 
-    def agent_params(self, agent: str, known: Mapping[str, list[str]]) -> Params:
-        """The parameters meant for one agent: its own (``agent.key``) and those it knows."""
-        prefix = f"{agent}."
-        mine = {k: v for k, v in self.params.items() if "." not in k and k in known[agent]}
+    def agent_params(self, label: str, known: Sequence[str]) -> Params:
+        """The parameters meant for one agent: its own (``label.key``) and those it knows."""
+        prefix = f"{label}."
+        mine = {k: v for k, v in self.params.items() if "." not in k and k in known}
         return mine | {
             k.removeprefix(prefix): v for k, v in self.params.items() if k.startswith(prefix)
         }
@@ -204,14 +218,23 @@ PATH_KEYS = ("net", "routes", "additional")
 
 
 def read_config(file: Path) -> dict[str, Any]:
-    """The keys of a scenario file (TOML), paths resolved against its folder."""
+    """The settings of a scenario file (TOML), paths resolved against its folder."""
+    return settings_in(read_toml(file), file)
+
+
+def read_toml(file: Path) -> dict[str, Any]:
+    """What a scenario file holds, unchecked."""
     try:
-        data = tomllib.loads(file.read_text(encoding="utf-8"))
+        return tomllib.loads(file.read_text(encoding="utf-8"))
     except OSError as error:
         raise InputError(f"config {str(file)!r}: {error.strerror}") from error
     except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
         raise InputError(f"config {str(file)!r}: {error}") from error
-    _check_keys(data, str(file))
+
+
+def settings_in(data: Mapping[str, Any], file: Path, place: str = "") -> dict[str, Any]:
+    """The settings of a table of a scenario file: keys checked, paths resolved."""
+    _check_keys(data, place or str(file))
     return {k: _resolved(k, v, file.parent) for k, v in data.items()}
 
 

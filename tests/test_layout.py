@@ -26,9 +26,9 @@ ORDER = """
     contacts
     assertions.base assertions.collision assertions.reaction_zone assertions
     egos.base egos.constant egos.sumo egos.time_gap egos.controller egos
-    options scenario outcomes rewards sumo_types demand simulations world
+    options labels scenario study outcomes rewards sumo_types demand simulations world
     jobs stage simulator setting theatre worker_process worker batch executors
-    statistics tally stopping results recorder learning progress session
+    statistics tally stopping results recorder learning progress session checked
     summary interrupts replays listings
     testing.scripts testing.ego_checks testing.agent_checks testing.assertion_checks testing
     commands commands.run commands.replay commands.merge commands.inspect commands.import_osm

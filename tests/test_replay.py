@@ -11,8 +11,9 @@ from typing import Any
 
 import pytest
 
+from cavsumo.checked import Manner
 from cavsumo.commands.replay import replay, replayed
-from cavsumo.commands.run import Manner, run
+from cavsumo.commands.run import run
 from cavsumo.errors import Exit, ResultsError
 from cavsumo.executors import Means
 from cavsumo.outcomes import COLUMNS, Outcome
