@@ -10,6 +10,7 @@
     |-- EgoError                the ego's controller raised or gave an answer that is none
     |-- AgentError              a tester agent raised or chose an action outside its space
     |-- SimulationError         SUMO refused a call, or the ego never entered the network
+    |   `-- SimulationTaken     another world took the one simulation of this process
     |-- BatchError              a batch cannot go on; what ran is kept (exit status 3)
     `-- ResultsError            results on disk are missing, foreign or damaged (exit status 2)
 """
@@ -66,6 +67,10 @@ class AgentError(CavsumoError):
 
 class SimulationError(CavsumoError):
     """SUMO refused a call, or the ego never entered the network."""
+
+
+class SimulationTaken(SimulationError):
+    """Another world of this process began an episode: a process has one simulation."""
 
 
 class BatchError(CavsumoError):

@@ -6,11 +6,13 @@ Imported by the parent process, so nothing here touches SUMO.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from cavsumo.agents import AGENTS, Agent
+from cavsumo.agents.policy import make_agent, parameters_of, policy_file
 from cavsumo.bodies import Body, kind_named, model_of
 from cavsumo.errors import InputError, UnknownName
 from cavsumo.labels import labelled
@@ -55,8 +57,13 @@ def job(plan: BatchPlan, run: int, memory: tuple[Any, ...] | None = None) -> Job
 def make_agents(plan: BatchPlan, label: str) -> list[Agent]:
     """The agents of one label, one for each team."""
     name = plan.cast[label]
-    params = plan.agent_params(label, [p.name for p in AGENTS.parameters(name)])
-    return [AGENTS.make(name, params) for _ in teams(plan.scenario)]
+    params = plan.agent_params(label, [p.name for p in parameters_of(name)])
+    return [make_agent(name, params) for _ in teams(plan.scenario)]
+
+
+def policy_files(plan: BatchPlan) -> list[Path]:
+    """The files of the agents that are policies."""
+    return [file for name in plan.cast.values() if (file := policy_file(name)) is not None]
 
 
 def learners(plan: BatchPlan) -> frozenset[str]:
@@ -100,14 +107,19 @@ def head(plan: BatchPlan, job: Job) -> Row:
 
 def check_agents(plan: BatchPlan) -> None:
     """Build every agent once and account for every parameter, before anything starts."""
-    known = {label: [p.name for p in AGENTS.parameters(name)] for label, name in plan.cast.items()}
+    known = {label: [p.name for p in parameters_of(name)] for label, name in plan.cast.items()}
     shared = {key for keys in known.values() for key in keys}
     qualified = {f"{label}.{key}" for label, keys in known.items() for key in keys}
     for key in plan.params:
         valid = qualified if "." in key else shared
         if key not in valid:
             raise UnknownName("parameter", key, valid, f"agent {' '.join(plan.agents)}")
+    kind = kind_named(plan.scenario.kind)
     for label, name in plan.cast.items():
         if label != name and label in AGENTS:
             raise InputError(f"agent {label}={name}: the label is the name of another agent")
-        make_agents(plan, label)
+        for agent in make_agents(plan, label)[:1]:
+            try:
+                agent.check_bodies(kind, plan.scenario.bodies_per_agent)
+            except ValueError as error:
+                raise InputError(f"agent {label}: {error}") from error

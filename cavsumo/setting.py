@@ -22,7 +22,7 @@ from cavsumo.demand import BEYOND_S
 from cavsumo.egos import make_ego
 from cavsumo.egos.base import Ego
 from cavsumo.errors import InputError
-from cavsumo.jobs import check_agents, learners, make_agents
+from cavsumo.jobs import check_agents, learners, make_agents, policy_files
 from cavsumo.options import OPTIONS
 from cavsumo.scenario import BatchPlan
 from cavsumo.signals import Pace
@@ -65,8 +65,11 @@ class Setting:
             raise InputError(f"{name} is {here} in the process that simulates, expected {there}")
 
 
-def prepare(plan: BatchPlan) -> Setting:
-    """Check every name and parameter of a plan and derive its site; raises InputError."""
+def prepare(plan: BatchPlan, ego: Ego | None = None) -> Setting:
+    """Check every name and parameter of a plan and derive its site; raises InputError.
+
+    ``ego`` drives instead of the one that the plan names.
+    """
     scenario = plan.scenario
     check_agents(plan)
     for name in scenario.assertions:
@@ -79,7 +82,7 @@ def prepare(plan: BatchPlan) -> Setting:
             f"{what}: {' and '.join(sorted(learners(plan)))} learns from episode to episode, in "
             "sequence; learn=false plays what was learned"
         )
-    ego = make_ego(scenario.ego, scenario.ego_params)
+    ego = ego or make_ego(scenario.ego, scenario.ego_params)
     site = derive_site(
         scenario.net, scenario.ego_route, scenario.junction, ego.kind, wishes(plan, kind, ego)
     )
@@ -142,6 +145,7 @@ def checksums(plan: BatchPlan) -> dict[str, str]:
     """The SHA-256 of every file that a plan names."""
     scenario = plan.scenario
     files = [scenario.net, *([scenario.routes] if scenario.routes else []), *scenario.additional]
+    files += policy_files(plan)
     return {str(file): hashlib.sha256(file.read_bytes()).hexdigest() for file in files}
 
 

@@ -105,8 +105,18 @@ class Performance:
         self.over = _over(stage, successor)
         return rewards
 
+    @property
+    def contacts(self) -> ContactMonitor:
+        """Who touched whom so far."""
+        return self._episode.contacts
+
+    @property
+    def judgement(self) -> Judgement:
+        """The most serious of what the assertions say so far."""
+        return _worst(self._stage)
+
     def finished(self) -> Episode:
-        """What happened."""
+        """What happened, or what happened so far."""
         return _finished(self._stage, self._episode, self.snapshot, self._ledger)
 
 
@@ -248,8 +258,7 @@ def _at_end(scene: Scene, snapshot: Snapshot) -> bool:
 
 def _finished(stage: Stage, episode: Episode, snapshot: Snapshot, ledger: Ledger) -> Episode:
     """The episode with its totals."""
-    judgements = [a.judgement for a in stage.assertions]
-    episode.judgement = min(judgements, key=lambda j: SEVERITY.index(j.verdict))
+    episode.judgement = _worst(stage)
     episode.steps, episode.time = snapshot.step, snapshot.time
     episode.cost, episode.reward = ledger.cost, ledger.total
     world = stage.world
@@ -257,3 +266,9 @@ def _finished(stage: Stage, episode: Episode, snapshot: Snapshot, ledger: Ledger
     episode.teleports, episode.emergency_stops = world.teleports, world.emergency_stops
     assert math.isfinite(episode.reward)
     return episode
+
+
+def _worst(stage: Stage) -> Judgement:
+    """The most serious judgement."""
+    judgements = [a.judgement for a in stage.assertions]
+    return min(judgements, key=lambda j: SEVERITY.index(j.verdict))

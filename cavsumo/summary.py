@@ -71,7 +71,7 @@ def _table(ended: Sequence[Ended]) -> Table:
     several = any(one.name for one in ended)
     table = Table(box=None, pad_edge=False, padding=(0, 2, 0, 0))
     for title in ("batch", "agent") if several else ("agent",):
-        table.add_column(title, no_wrap=several)
+        table.add_column(title, overflow="fold")  # a path may be long
     for title in ("runs", "tests", "rate", "95 % interval", "failures", "of tests"):
         table.add_column(title, justify="right", no_wrap=True)
     for title in ("unfair", "errors", "median time"):

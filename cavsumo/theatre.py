@@ -48,7 +48,7 @@ class Theatre:
                 record=job.record or (self.plan.trace != "none" and job.simulation == "own"),
                 simulation=job.simulation,
             )
-            row = _row(self.plan, job, episode)
+            row = head(self.plan, job) | measured(episode)
             trace = self._trace(job, row, episode)
             memory = _recall(agents)
         except Exception as error:  # whatever it is, it costs this row and no other
@@ -75,11 +75,11 @@ class Theatre:
         return ""
 
 
-def _row(plan: BatchPlan, job: Job, episode: Episode) -> Row:
-    """The row of a finished episode."""
+def measured(episode: Episode) -> Row:
+    """The columns of a row that a finished episode fills."""
     judgement, contacts = episode.judgement, episode.contacts
     with_ego = {pair for pair in episode.sumo_collisions if "ego" in pair}
-    return head(plan, job) | {
+    return {
         "outcome": judgement.verdict,
         "assertion": judgement.assertion if judgement.triggered else "",
         "tester": judgement.tester,

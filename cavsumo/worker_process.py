@@ -26,10 +26,10 @@ PR_SET_PDEATHSIG = 1  # Linux, prctl(2)
 
 def main(pipe_fd: int, log_fd: int, parent: int) -> None:
     """Set up what the first message describes, say so, then play."""
-    _die_with(parent)
+    die_with(parent)
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # the parent decides what Ctrl-C means
     signal.signal(signal.SIGALRM, signal.SIG_DFL)
-    _divert_output(log_fd)
+    divert_output(log_fd)
     pipe = Connection(pipe_fd)
     with contextlib.suppress(EOFError, ConnectionError):  # the parent is gone or has no more jobs
         _serve(pipe, pipe.recv())
@@ -57,7 +57,7 @@ def _serve(pipe: Connection, setting: Setting) -> None:
         pipe.send(GOODBYE)
 
 
-def _die_with(parent: int) -> None:
+def die_with(parent: int) -> None:
     """Ask Linux to kill this process when its parent dies."""
     if sys.platform == "linux":
         ctypes.CDLL(None).prctl(PR_SET_PDEATHSIG, signal.SIGKILL)
@@ -65,7 +65,7 @@ def _die_with(parent: int) -> None:
         os._exit(1)
 
 
-def _divert_output(log_fd: int) -> None:
+def divert_output(log_fd: int) -> None:
     """Send what SUMO prints to a file; what Python prints goes to the real stderr."""
     sys.stdout = sys.stderr = os.fdopen(os.dup(2), "w", buffering=1)
     os.dup2(log_fd, 1)

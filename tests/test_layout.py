@@ -23,11 +23,15 @@ ORDER = """
     osm handedness netconvert facts inspection layers picture
     agents.base agents.walking agents.driving agents.triggers agents.random agents.features
     agents.manoeuvres agents.behaviours agents.programmed agents.election agents.qlearning agents
+    observations policies agents.policy
+    ego_observations
     contacts
     assertions.base assertions.collision assertions.reaction_zone assertions
     egos.base egos.constant egos.sumo egos.time_gap egos.controller egos
-    options labels scenario study outcomes rewards sumo_types demand simulations world
+    options labels scenario study outcomes rewards ego_rewards sumo_types demand simulations world
     jobs stage simulator setting theatre worker_process worker batch executors
+    envs.spaces envs.puppets envs.settings envs.events envs.episodes envs.elsewhere_process
+    envs.elsewhere envs.painting envs.base envs.tester envs.ego envs.parallel envs.discrete envs
     statistics tally stopping results recorder learning progress session checked
     summary interrupts replays listings
     testing.scripts testing.ego_checks testing.agent_checks testing.assertion_checks testing
