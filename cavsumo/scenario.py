@@ -7,7 +7,6 @@ are refused with the nearest valid one.
 from __future__ import annotations
 
 import math
-import tomllib
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Annotated, Any, Literal
@@ -214,28 +213,6 @@ def part_of(text: str) -> tuple[int, int]:
 
 SCENARIO_KEYS = frozenset(Scenario.model_fields)
 PLAN_KEYS = frozenset(BatchPlan.model_fields) - {"scenario"}
-PATH_KEYS = ("net", "routes", "additional")
-
-
-def read_config(file: Path) -> dict[str, Any]:
-    """The settings of a scenario file (TOML), paths resolved against its folder."""
-    return settings_in(read_toml(file), file)
-
-
-def read_toml(file: Path) -> dict[str, Any]:
-    """What a scenario file holds, unchecked."""
-    try:
-        return tomllib.loads(file.read_text(encoding="utf-8"))
-    except OSError as error:
-        raise InputError(f"config {str(file)!r}: {error.strerror}") from error
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        raise InputError(f"config {str(file)!r}: {error}") from error
-
-
-def settings_in(data: Mapping[str, Any], file: Path, place: str = "") -> dict[str, Any]:
-    """The settings of a table of a scenario file: keys checked, paths resolved."""
-    _check_keys(data, place or str(file))
-    return {k: _resolved(k, v, file.parent) for k, v in data.items()}
 
 
 def plan_from(settings: Mapping[str, Any], source: str) -> BatchPlan:
@@ -245,7 +222,7 @@ def plan_from(settings: Mapping[str, Any], source: str) -> BatchPlan:
     found when none is named and no traffic is to be drawn; ``routes = "none"`` keeps the roads
     empty.
     """
-    _check_keys(settings, source)
+    check_keys(settings, source)
     if "net" not in settings:
         raise InputError(f"{source}: no network given; name one with --net FILE")
     scenario = {k: v for k, v in settings.items() if k in SCENARIO_KEYS}
@@ -275,7 +252,7 @@ def plan_from(settings: Mapping[str, Any], source: str) -> BatchPlan:
     return plan
 
 
-def _check_keys(settings: Mapping[str, Any], source: str) -> None:
+def check_keys(settings: Mapping[str, Any], source: str) -> None:
     """Refuse keys that no setting has."""
     for key in settings:
         if key not in SCENARIO_KEYS | PLAN_KEYS:
@@ -302,23 +279,6 @@ def _route_file(scenario: Mapping[str, Any], source: str) -> Path | None:
         if file.is_file():
             return file
     return None
-
-
-def _resolved(key: str, value: Any, folder: Path) -> Any:
-    """A path of a scenario file, relative to that file, as SUMO has it in its own."""
-    if key == "agents" and isinstance(value, list):
-        return [_resolved_agent(name, folder) for name in value]
-    if key not in PATH_KEYS or value == "none":
-        return value
-    if isinstance(value, list):
-        return [str(folder / str(v)) for v in value]
-    return str(folder / str(value))
-
-
-def _resolved_agent(name: Any, folder: Path) -> Any:
-    """An agent of a scenario file; the file of a policy is a path like others."""
-    prefix, colon, file = str(name).partition(":")
-    return f"{prefix}:{folder / file}" if prefix == "policy" and colon and file else name
 
 
 def _first_problem(error: ValidationError) -> str:

@@ -23,10 +23,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from cavsumo.config import PATH_KEYS, VARY, read_toml, settings_in
 from cavsumo.errors import InputError
-from cavsumo.scenario import PATH_KEYS, read_toml, settings_in
 
-VARY = "vary"
 TABLES = ("params", "ego_params", "assertion_params")  # settings that add up, key by key
 NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9._-]*")
 MOST, LONGEST = 1000, 100  # batches of a study; characters of a batch's name

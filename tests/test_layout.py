@@ -28,7 +28,8 @@ ORDER = """
     contacts
     assertions.base assertions.collision assertions.reaction_zone assertions
     egos.base egos.constant egos.sumo egos.time_gap egos.controller egos
-    options labels scenario study outcomes rewards ego_rewards sumo_types demand simulations world
+    options labels scenario config study outcomes rewards ego_rewards
+    sumo_types demand simulations world
     jobs stage simulator setting theatre worker_process worker batch executors
     envs.spaces envs.puppets envs.settings envs.events envs.episodes envs.elsewhere_process
     envs.elsewhere envs.painting envs.base envs.tester envs.ego envs.parallel envs.discrete envs
