@@ -35,10 +35,13 @@ ORDER = """
     envs.elsewhere envs.painting envs.base envs.tester envs.ego envs.parallel envs.discrete envs
     statistics tally stopping results recorder learning progress session checked
     summary interrupts replays listings
+    report report.load report.grouping report.rates report.pairs report.compare report.survival
+    report.effort report.events report.distinct report.analysis report.tables report.figures
+    report.formats report.junit
     testing.scripts testing.ego_checks testing.agent_checks testing.assertion_checks testing
-    commands commands.run commands.replay commands.merge commands.inspect commands.import_osm
-    commands.check_ego
-    cli_settings cli_egos cli_networks cli __main__
+    commands commands.run commands.replay commands.merge commands.report commands.inspect
+    commands.import_osm commands.check_ego
+    cli_settings cli_egos cli_networks cli_results cli __main__
 """.split()
 
 HEAVY = {"numpy", "pandas", "scipy", "shapely", "libsumo", "sumolib", "pydantic", "rich"}

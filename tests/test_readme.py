@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import itertools
 import re
 import shlex
+import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -12,6 +14,7 @@ import pytest
 
 ROOT = Path(__file__).resolve().parents[1]
 README = (ROOT / "README.md").read_text(encoding="utf-8")
+REPORTS = sorted(set(re.findall(r"^cavsumo report [^`\n]*", README, re.MULTILINE)))
 COMMANDS = sorted(set(re.findall(r"cavsumo run [^`\n]*", README)))
 
 
@@ -52,6 +55,21 @@ def test_each_run_command_of_the_readme_runs(command: str, checkout: Path) -> No
     done = cavsumo(words, checkout)
     assert done.returncode in (0, 1), done.stderr
     assert "Traceback" not in done.stderr
+
+
+@pytest.mark.parametrize("command", REPORTS)
+def test_each_report_of_the_readme_is_written(command: str, checkout: Path) -> None:
+    """The files it names are read, those after -o and --junit written."""
+    words = shlex.split(command)[1:]
+    for name in words:
+        if name.endswith(".csv") and name != "results.csv":
+            shutil.copy(checkout / "results.csv", checkout / name)
+            shutil.copy(checkout / "results.json", checkout / f"{Path(name).stem}.json")
+    done = cavsumo(words, checkout)
+    assert (done.returncode, done.stderr) == (0, "")
+    for option, file in itertools.pairwise(words):
+        if option in ("-o", "--junit"):
+            assert (checkout / file).stat().st_size > 0
 
 
 def test_the_agents_of_the_readme_are_those_that_there_are(checkout: Path) -> None:
