@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from pathlib import Path
+from xml.etree import ElementTree
 
 import pytest
 from support import rows
@@ -86,3 +87,6 @@ def test_labelled_agents_play_as_they_would_alone(
     assert learned["tame"] != learned["wild"]
     assert main(["replay", "results.csv", "7"]) == 0
     assert main(["run", "--resume", "-q", "--exit-zero"]) == 0
+    assert main(["report", "results.csv", "--junit", "results.xml", "-o", "report.txt"]) == 0
+    cases = ElementTree.parse("results.xml").iter("testcase")
+    assert {case.get("classname") for case in cases} == {"timing", "late", "tame", "wild"}

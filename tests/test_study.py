@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import csv
 import shutil
 import signal
 import subprocess
@@ -17,7 +18,9 @@ from cavsumo.errors import InputError
 from cavsumo.results import read_manifest
 from cavsumo.scenario import plan_from
 from cavsumo.setting import prepare
+from cavsumo.statistics import rate
 from cavsumo.study import Choice, Part, overruled, product, read_study
+from cavsumo.summary import interval
 
 ROOT = Path(__file__).parents[1]
 Write = Callable[[str], Path]
@@ -312,3 +315,19 @@ def test_the_experiment_can_be_played() -> None:
         assert plan.agent_params("nearest", ["rule"])["rule"] == "unsigned"
         assert setting.site.demand is None
         assert (plan.scenario.routes is None) == part.name.startswith("straight")
+
+
+def test_the_page_of_the_experiment_says_what_its_table_says() -> None:
+    """Every tester of every cell has its share with interval on the page, and none is missing."""
+    folder = ROOT / "experiments"
+    page = (folder / "README.md").read_text(encoding="utf-8").splitlines()
+    with (folder / "agency.csv").open(encoding="utf-8", newline="") as stream:
+        table = list(csv.DictReader(stream))
+    assert len(table) == 9 * 7
+    for row in table:
+        assert int(row["errors"]) == 0
+        count, total = int(row["tests"]), int(row["episodes"])
+        (line,) = (x for x in page if x.startswith(f"| {row['place']} | {row['agent']} | **"))
+        cell = line.split(" | ")[2 + (1, 3, 6).index(int(row["testers"]))]
+        found = rate(count, total)
+        assert cell.startswith(f"**{100 * count / total:.1f}** {interval(found)}; ")
