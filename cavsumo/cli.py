@@ -14,7 +14,7 @@ from cavsumo.cli_egos import add_check_ego
 from cavsumo.cli_networks import add_import_osm, add_inspect
 from cavsumo.cli_results import add_merge, add_replay, add_report
 from cavsumo.cli_settings import parts_of
-from cavsumo.errors import BatchError, CavsumoError, Exit, InputError
+from cavsumo.errors import BatchError, CavsumoError, DivergenceError, Exit, InputError
 
 HYPHENATED = ("--bbox", "--ego-route", "--junction")  # options whose values may begin with "-"
 
@@ -26,6 +26,9 @@ def main(argv: Sequence[str] | None = None) -> int:
         options = _parser().parse_args(_joined(words))
         status: int = options.command(options)
         return status
+    except DivergenceError as error:
+        print(f"cavsumo: {error}", file=sys.stderr)
+        return Exit.VIOLATED
     except CavsumoError as error:
         print(f"cavsumo: {error}", file=sys.stderr)
         return Exit.NOT_RUN if isinstance(error, BatchError) else Exit.USAGE
@@ -178,8 +181,19 @@ def _add_scenario(group: Any) -> None:
         metavar="FILE",
         help="scenario file (TOML); with a table [vary] of lists, a batch for each combination",
     )
-    add("--ego", metavar="NAME", help="an ego by name (see cavsumo egos) or module:Class")
+    add(
+        "--ego",
+        metavar="NAME",
+        help="an ego by name, module:Class, exec:COMMAND, tcp:HOST:PORT; see cavsumo egos",
+    )
     add("--ego-param", action="append", metavar="KEY=VALUE", help="a parameter of the ego")
+    add(
+        "--ego-sensor",
+        action="append",
+        metavar="KEY=VALUE",
+        help="what the ego sees of others: range_m, position_noise_m, heading_noise_rad, "
+        "speed_noise_mps, delay_s, occlusion=true (default: everybody, exactly, at once)",
+    )
     add(
         "--ego-route",
         metavar="ROUTE",
@@ -212,6 +226,12 @@ def _add_testers(group: Any) -> None:
         action="append",
         metavar="KEY=VALUE",
         help="parameter of the agents that have it; NAME.KEY=VALUE or LABEL.KEY=VALUE for one",
+    )
+    add(
+        "--tester-sensor",
+        action="append",
+        metavar="KEY=VALUE",
+        help="what the agents see of others, as --ego-sensor",
     )
     add("--kind", help="kind of body: pedestrian (default), car, bus or bicycle")
     add(

@@ -42,6 +42,8 @@ def settings_of(options: argparse.Namespace) -> dict[str, Any]:
         ("params", options.param),
         ("ego_params", options.ego_param),
         ("assertion_params", options.assert_param),
+        ("ego_sensor", options.ego_sensor),
+        ("tester_sensor", options.tester_sensor),
     ):
         if words:
             settings[key] = dict(assignment(key, w) for w in words)

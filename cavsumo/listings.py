@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from inspect import Parameter
 from typing import Any
 
 from cavsumo.registry import Registry
@@ -22,19 +24,40 @@ def listing(sort: str, name: str | None) -> str:
     if sort == "agents" and name is not None and name.startswith("policy:"):
         return _policy(name)
     if name is None:
-        shown = [(n, registry.summary(n)) for n in registry]
-        if sort == "agents":
-            shown.append(("policy:FILE", "A tester that you trained, in a policy file (.npz)."))
-        return _columns(shown)
-    lines = [f"{name}: {registry.summary(name)}"]
-    shown = [(f"  {p.name}={p.default}", p.doc) for p in registry.parameters(name)]
-    return "\n".join([*lines, _columns(shown)] if shown else lines)
+        lines = {n: registry.summary(n) for n in registry}
+        return "\n".join(_columns({**lines, **_forms(sort)}))
+    if sort == "egos":
+        registry = _registry_of(name, registry)
+    name = name.partition(":")[0]
+    shown = {
+        f"{p.name}={p.default}": p.doc
+        for p in registry.parameters(name)
+        if p.default is not Parameter.empty  # what stands behind the colon
+    }
+    return "\n".join(
+        [f"{name}: {registry.summary(name)}", *(f"  {line}" for line in _columns(shown))]
+    )
 
 
-def _columns(shown: list[tuple[str, str]]) -> str:
-    """Names and what they mean, below each other."""
-    width = max(len(name) for name, _ in shown)
-    return "\n".join(f"{name:{width}}  {text}" for name, text in shown)
+def _columns(lines: Mapping[str, str]) -> list[str]:
+    """Two columns, the first as wide as need be."""
+    width = max(map(len, lines), default=0)
+    return [f"{first:{width}}  {second}" for first, second in lines.items()]
+
+
+def _forms(sort: str) -> Mapping[str, str]:
+    """How one from the user is named."""
+    from cavsumo.egos.specs import FORMS
+
+    policies = {"policy:FILE": "a tester that you trained, in a policy file (.npz)"}
+    return {"egos": FORMS, "agents": policies}.get(sort, {})
+
+
+def _registry_of(ego: str, registered: Registry[Any]) -> Registry[Any]:
+    """Where the parameters of an ego are found: exec and tcp have a registry of their own."""
+    from cavsumo.egos.external import EXTERNAL
+
+    return EXTERNAL if ego.partition(":")[0] in EXTERNAL else registered
 
 
 def _policy(spec: str) -> str:
@@ -47,10 +70,10 @@ def _policy(spec: str) -> str:
     policy = read_policy(file)
     header = policy.header
     sizes = [len(policy.mean), *(len(biases) for _, biases in policy.layers)]
-    facts = {
+    facts: dict[str, str] = {
         "bodies": f"{header.bodies} {header.kind} a team",
         "actions": f"{header.actions}, each for {header.hold} timesteps",
         "network": f"{' > '.join(map(str, sizes))}, {header.activation}",
     } | {key: str(value) for key, value in header.metadata.items()}
     title = f"{spec}: a trained policy; what it is shown: cavsumo/observations.py"
-    return "\n".join([title, _columns([(f"  {key}", text) for key, text in facts.items()])])
+    return "\n".join([title, *(f"  {line}" for line in _columns(facts))])

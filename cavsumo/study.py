@@ -25,8 +25,10 @@ from typing import Any
 
 from cavsumo.config import PATH_KEYS, VARY, read_toml, settings_in
 from cavsumo.errors import InputError
+from cavsumo.scenario import SENSOR_KEYS
 
-TABLES = ("params", "ego_params", "assertion_params")  # settings that add up, key by key
+# Settings that add up, key by key.
+TABLES = ("params", "ego_params", "assertion_params", *SENSOR_KEYS)
 NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9._-]*")
 MOST, LONGEST = 1000, 100  # batches of a study; characters of a batch's name
 
@@ -122,9 +124,12 @@ def overruled(settings: Mapping[str, Any], by: Mapping[str, Any]) -> Settings:
     """Settings with others in their place; tables of parameters key by key."""
     merged = dict(settings)
     for key, value in by.items():
-        before = merged.get(key)
-        both = key in TABLES and isinstance(before, dict) and isinstance(value, dict)
-        merged[key] = {**before, **value} if both and before is not None else value
+        if key in TABLES and isinstance(value, dict):
+            before = merged.get(key, {})
+            if not isinstance(before, dict):
+                raise InputError(f"{key}: expected a table in the scenario file, got {before!r}")
+            value = before | value
+        merged[key] = value
     return merged
 
 

@@ -148,7 +148,8 @@ def _say_first(ended: Sequence[Ended], console: Console) -> None:
                 _say(
                     console,
                     f"first {what}: run {row['run']} ({row['agent']}): {event(row)}"
-                    f"\n       cavsumo replay {one.csv_file} {row['run']}",
+                    f"\n       cavsumo replay {one.csv_file} {row['run']} --html "
+                    f"run{row['run']}.html",
                 )
                 return
 

@@ -29,7 +29,7 @@ def cavsumo(words: list[str], folder: Path) -> subprocess.CompletedProcess[str]:
 def checkout(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A folder as the README's reader has it, with the files that the README shows."""
     folder = tmp_path_factory.mktemp("checkout")
-    for name in ("networks", "routes"):
+    for name in ("networks", "routes", "examples"):
         (folder / name).symlink_to(ROOT / name)
     example = re.search(r"<!-- example: (\S+) -->\n```python\n(.*?)```", README, re.DOTALL)
     scenarios = re.findall(r"```toml\n(# (\S+):.*?)```", README, re.DOTALL)
@@ -50,6 +50,8 @@ def test_each_run_command_of_the_readme_runs(command: str, checkout: Path) -> No
     words = shlex.split(command, comments=True)[1:]
     if "--scheduler" in words:
         pytest.skip("there is no cluster of that name; tests/test_executors.py has one")
+    if "tcp:127.0.0.1:5000" in words:
+        pytest.skip("nobody listens there; tests/test_external_egos.py has the server")
     if not {"--help", "--resume", "--retry-errors"} & set(words):
         words += ["--runs", "1", "-o", "readme.csv"]
     done = cavsumo(words, checkout)

@@ -134,7 +134,8 @@ def test_the_product_is_pure() -> None:
         {"aim": 0.5, "idle": "kerb"},
     ]
     assert settings == {"params": {"aim": 0.5}}
-    assert overruled({"params": 3}, {"params": {"aim": 1}}) == {"params": {"aim": 1}}
+    with pytest.raises(InputError, match="params: expected a table in the scenario file, got 3"):
+        overruled({"params": 3}, {"params": {"aim": 1}})
 
 
 # What is refused ----------------------------------------------------------------------------------

@@ -29,18 +29,17 @@ class Play:
             choice("process", process, PROCESSES)
         except ValueError as error:
             raise InputError(f"{roles.named}: {error}") from error
-        self.setting = setting
         self.episodes = (Episodes if process == "this" else Elsewhere)(setting, roles)
         scenario = setting.plan.scenario
         self.fps = max(1, round(1.0 / (scenario.step_length * roles.hold)))
         self._painter: Any = None
+        if roles.drawn:
+            from cavsumo.envs.painting import Painter
+
+            self._painter = Painter(setting)
 
     def picture(self) -> NDArray[np.uint8]:
         """What there is to be seen now."""
-        if self._painter is None:
-            from cavsumo.envs.painting import Painter
-
-            self._painter = Painter(self.setting)
         picture: NDArray[np.uint8] = self._painter.paint(self.episodes.snapshot())
         return picture
 

@@ -18,6 +18,7 @@ from typing import Any
 from cavsumo.envs.episodes import Seen
 from cavsumo.envs.settings import Roles
 from cavsumo.errors import CavsumoError, SimulationError
+from cavsumo.processes import inner_environment
 from cavsumo.setting import Setting
 from cavsumo.snapshot import Snapshot
 
@@ -61,6 +62,9 @@ class Elsewhere:
         except _Gone as gone:
             self.close()
             raise SimulationError(f"{gone}; reset starts another one") from None
+        except BaseException:  # interrupted: the answer must not be taken for the next one's
+            self.close()
+            raise
         if isinstance(answer, CavsumoError):
             raise answer
         return answer
@@ -76,14 +80,13 @@ class _Child:
     def __init__(self, setting: Setting, roles: Roles) -> None:
         self._pipe, theirs = Pipe()
         self._deadline = setting.plan.deadline_s
-        paths = os.pathsep.join(sys.path)
         numbers = str(theirs.fileno()), str(os.getpid())
         try:
             self._process = subprocess.Popen(
                 [sys.executable, "-P", "-m", "cavsumo.envs.elsewhere_process", *numbers],
                 pass_fds=(theirs.fileno(),),
                 cwd=setting.folder,
-                env=os.environ | {"PYTHONPATH": paths},
+                env=inner_environment(),
                 stdin=subprocess.DEVNULL,
                 process_group=0,
             )
@@ -91,7 +94,7 @@ class _Child:
             raise SimulationError(f"cannot start a process to simulate in: {error}") from error
         finally:
             theirs.close()
-        self.end = weakref.finalize(self, _end, self._process, self._pipe)
+        self.end = weakref.finalize(self, _end, self._process, self._pipe, os.getpid())
         self._pipe.send((setting, roles))
 
     def call(self, method: str, *arguments: Any) -> Any:
@@ -107,8 +110,10 @@ class _Child:
         raise _Gone(f"the simulation process did not answer within {self._deadline:g} s, killed")
 
 
-def _end(process: subprocess.Popen[bytes], pipe: Connection) -> None:
-    """Kill a process, which holds nothing that is missed, and reap it."""
+def _end(process: subprocess.Popen[bytes], pipe: Connection, owner: int) -> None:
+    """Kill a process, which holds nothing that is missed, and reap it; not from a fork."""
     pipe.close()
+    if os.getpid() != owner:
+        return
     process.kill()
     process.wait(10.0)

@@ -10,12 +10,13 @@ from multiprocessing.connection import Connection
 from typing import Any
 
 from cavsumo.errors import CavsumoError, SimulationError
-from cavsumo.worker_process import die_with, divert_output
+from cavsumo.processes import leash
+from cavsumo.worker_process import divert_output
 
 
 def main(pipe_fd: int, parent: int) -> None:
     """Serve calls until the pipe closes."""
-    die_with(parent)
+    leash(parent)()
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     pipe = Connection(pipe_fd)
     with tempfile.TemporaryFile() as log:  # what SUMO prints

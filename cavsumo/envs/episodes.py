@@ -17,7 +17,7 @@ from cavsumo.envs.events import Watch
 from cavsumo.envs.puppets import PuppetAgent, PuppetEgo
 from cavsumo.envs.settings import Roles
 from cavsumo.envs.spaces import Vector
-from cavsumo.errors import SimulationError
+from cavsumo.errors import SimulationError, SimulationTaken
 from cavsumo.jobs import make_agents
 from cavsumo.observations import Observer
 from cavsumo.setting import Setting
@@ -141,7 +141,13 @@ class Episodes:
         """One timestep, and what everybody earned in it."""
         assert self._stage is not None
         before = performance.snapshot
-        feedback = performance.step()
+        try:
+            feedback = performance.step()
+        except SimulationTaken as error:
+            raise SimulationTaken(
+                "this process has one simulation, and another environment or world took it; reset "
+                "this one, or play with process='own' or in an AsyncVectorEnv"
+            ) from error
         self._left = performance.snapshot is before
         if feedback is not None:
             self._game_over = feedback[1]
@@ -166,13 +172,14 @@ class Episodes:
 
     def _observations(self) -> dict[str, Vector]:
         """What each role is shown now."""
-        snapshot = self.snapshot()
+        performance = self._watch.performance
+        views = performance.agent_views if self._observers else ()
         seen = {
-            name: observer.vector(snapshot)
-            for name, observer in zip(self._teams, self._observers, strict=True)
+            name: observer.vector(view)
+            for name, observer, view in zip(self._teams, self._observers, views, strict=True)
         }
         if self._puppet_ego is not None:
-            seen[EGO] = self._ego_observer.vector(snapshot)
+            seen[EGO] = self._ego_observer.vector(performance.ego_view)
         return seen
 
 

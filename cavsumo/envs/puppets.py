@@ -8,15 +8,14 @@ from collections.abc import Sequence
 import numpy as np
 
 from cavsumo.agents.base import Agent
-from cavsumo.agents.features import TARGETS
-from cavsumo.agents.walking import walk
+from cavsumo.agents.features import across, towards
+from cavsumo.agents.policy import effort
 from cavsumo.bodies import Action
 from cavsumo.checks import choice, number
 from cavsumo.egos.base import EGO_KIND, Acceleration, Command, Drive, Ego
-from cavsumo.envs.spaces import steering_of, throttle_of
 from cavsumo.errors import InputError
 from cavsumo.scene import Scene
-from cavsumo.snapshot import BodyState, Snapshot
+from cavsumo.snapshot import Snapshot
 
 CONTROLS = ("acceleration", "drive")
 ACTIONS = ("effectors", "targets")
@@ -27,7 +26,7 @@ class PuppetAgent(Agent):
 
     Args:
         actions: "effectors": throttle and steering of each body in [-1, 1]; "targets": for each
-            body one of TARGETS, to which it walks until it is told another.
+            body one of ``agents.features.TARGETS``, to which it walks until it is told another.
         sees_background: whether snapshots must show everybody.
 
     Attributes:
@@ -41,25 +40,19 @@ class PuppetAgent(Agent):
 
     def reset(self, scene: Scene, owned: Sequence[int], rng: np.random.Generator) -> None:
         super().reset(scene, owned, rng)
-        self._across = [way.heading if (way := scene.way(i)) else None for i in owned]
+        self._ways = [across(scene, i) for i in owned] if self._aims else []
 
     def choose_action(self, snapshot: Snapshot) -> tuple[Action, ...]:
         told, own = self.told, self.own(snapshot)
         if self._aims:
-            return tuple(self._walk(i, state, int(told[i])) for i, state in enumerate(own))
+            return tuple(
+                towards(state, way, int(target), self.scene.dt)
+                for state, way, target in zip(own, self._ways, told, strict=True)
+            )
         return tuple(
-            Action(throttle_of(t, state.body.kind), steering_of(s, state.body.kind))
-            for state, t, s in zip(own, told[::2], told[1::2], strict=True)
+            effort(state.body.kind, throttle, steering)
+            for state, throttle, steering in zip(own, told[::2], told[1::2], strict=True)
         )
-
-    def _walk(self, i: int, state: BodyState, target: int) -> Action:
-        """Throttle and steering towards a target."""
-        moving, turn = TARGETS[target]
-        across = self._across[i]
-        if across is None:
-            across = self.scene.starts[self.owned[i]].o
-        heading = across + turn if moving else state.o
-        return walk(state, heading, moving * state.body.kind.v_max, self.scene.dt)
 
 
 class PuppetEgo(Ego):
@@ -96,7 +89,6 @@ class PuppetEgo(Ego):
         return super().vtype() | {"maxSpeed": f"{self.kind.v_max}"}
 
     def act(self, snapshot: Snapshot) -> Command:
-        throttle = throttle_of(self.told[0], self.kind)
         if self.steers:
-            return Drive(throttle, steering_of(self.told[1], self.kind))
-        return Acceleration(throttle)
+            return Drive(*effort(self.kind, *self.told))
+        return Acceleration(effort(self.kind, self.told[0], 0.0).throttle)

@@ -1,4 +1,4 @@
-"""Spaces of actions and observations; from an action in its space to what the effectors do.
+"""Spaces of actions and observations, and actions as plain numbers.
 
 "effectors": for each effector a number in [-1, 1], from its lower to its upper limit, as learners
 like it; what lies outside is clamped. "targets": for each body one of ``agents.features.TARGETS``.
@@ -16,7 +16,7 @@ from gymnasium import spaces
 from numpy.typing import NDArray
 
 from cavsumo.agents.features import TARGETS
-from cavsumo.bodies import Body, Kind, model_of
+from cavsumo.bodies import Body, model_of
 from cavsumo.errors import AgentError
 
 Vector = NDArray[np.float32]
@@ -55,14 +55,3 @@ def numbers(values: Any, space: ActionSpace, who: str) -> list[float]:
     if not all(value.is_integer() and 0 <= value < len(TARGETS) for value in found):
         raise AgentError(f"{who}: a target is a number from 0 to {len(TARGETS) - 1}, got {values}")
     return found
-
-
-def throttle_of(value: float, kind: Kind) -> float:
-    """The throttle that a number in [-1, 1] stands for [m/s2]."""
-    middle, half = kind.throttle_max + kind.throttle_min, kind.throttle_max - kind.throttle_min
-    return 0.5 * (middle + half * value)
-
-
-def steering_of(value: float, kind: Kind) -> float:
-    """The steering angle that a number in [-1, 1] stands for [rad]."""
-    return value * kind.steering_max
