@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import io
 import math
+import os
 import re
 import warnings
 from collections.abc import Sequence
@@ -25,7 +26,7 @@ from cavsumo.report.survival import Curve
 
 WIDTH_IN = 3.6  # as narrow as a phone, so that text is as large there as elsewhere
 ROW_IN, FRAME_IN = 0.26, 0.3  # height of a line of bars, and of what is around them
-LABEL = 26  # letters of a name beside an axis
+LABEL = 30  # letters of a name beside an axis
 INK, SOFT, EDGE = "#010201", "#010202", "#010203"
 SERIES = [f"#0103{i:02x}" for i in range(8)]
 DASHES = [(), (5, 2), (1, 1.3), (6, 2, 1, 2)]  # in widths of the line
@@ -143,7 +144,7 @@ def _lines(bars: Sequence[Bar]) -> tuple[Figure, Axes]:
     figure = Figure(figsize=(WIDTH_IN, FRAME_IN + ROW_IN * len(bars)), layout="constrained")
     axes = figure.add_subplot()
     axes.set_ylim(len(bars) - 0.5, -0.5)
-    axes.set_yticks(range(len(bars)), [_cut(bar.label) for bar in bars])
+    axes.set_yticks(range(len(bars)), _short([bar.label for bar in bars]))
     beside = axes.secondary_yaxis("right")
     beside.set_yticks(range(len(bars)), [bar.text for bar in bars])
     beside.tick_params(length=0, labelcolor=SOFT)
@@ -176,10 +177,17 @@ def _plain(axes: Axes) -> None:
     axes.set_axisbelow(True)
 
 
+def _short(names: Sequence[str]) -> list[str]:
+    """Names as short lines, to stand beside an axis: without what all begin with, cut inside."""
+    letters = os.path.commonprefix(names) if len(names) > 1 else ""  # noqa: RUF071  # letters meant
+    begin = max(letters.rfind(mark) for mark in "-_/") + 1
+    return [_cut(name[begin:].replace(".csv", "")) for name in names]
+
+
 def _cut(text: str) -> str:
-    """A name as one short line, to stand beside an axis."""
+    """A name as one line that is not too long; its end, the agent, stays."""
     text = "".join(letter if letter.isprintable() else "\ufffd" for letter in text)
-    return text if len(text) <= LABEL else text[: LABEL - 1] + "…"
+    return text if len(text) <= LABEL else f"{text[: LABEL // 3]}…{text[1 - LABEL + LABEL // 3 :]}"
 
 
 def _svg(figure: Figure) -> str:
