@@ -20,7 +20,8 @@ from gymnasium.vector import AsyncVectorEnv
 from support import SHORT, STRAIGHT_NET
 
 from cavsumo.agents import AGENTS
-from cavsumo.bodies import PEDESTRIAN
+from cavsumo.bodies import CAR, PEDESTRIAN
+from cavsumo.ego_observations import entries as ego_entries
 from cavsumo.ego_rewards import HARSH_COST, OFF_ROAD, PROGRESS, TIME_COST, VIOLATION
 from cavsumo.egos import make_ego
 from cavsumo.egos.base import Acceleration, Command
@@ -29,6 +30,7 @@ from cavsumo.envs.discrete import DiscreteActions
 from cavsumo.envs.ego import EgoEnv
 from cavsumo.errors import AgentError, InputError, SimulationError, SimulationTaken
 from cavsumo.jobs import Job
+from cavsumo.observations import entries
 from cavsumo.outcomes import cell
 from cavsumo.rewards import GOAL, ROAD_COST
 from cavsumo.simulator import Performance
@@ -37,6 +39,7 @@ from cavsumo.stage import set_stage
 from cavsumo.theatre import Theatre
 from cavsumo.world import World
 
+NEAR = {"range_m": 3.0}
 IDS = ("cavsumo/Tester-v0", "cavsumo/Ego-v0")
 Make = Callable[..., Any]
 
@@ -329,6 +332,18 @@ def test_an_action_lasts_as_long_as_asked(make: Make) -> None:
         assert step[1] == pytest.approx(sum(s[1] for s in singles[5 * i : 5 * i + 5]))
         assert step[4]["time_s"] == singles[5 * i + 4][4]["time_s"]
     assert fivefold.unwrapped.metadata["render_fps"] == 2
+
+
+def test_learners_see_through_their_sensors(make: Make) -> None:
+    """A tester that sees 3 m far knows no speed of the ego; an ego that does, nobody around."""
+    speed = [name for name, _, _ in entries(1, 1.0, 1.0)].index("ego.speed_mps")
+    seen = [make(testers=1, **sensor).reset(seed=5)[0] for sensor in ({}, {"tester_sensor": NEAR})]
+    assert seen[0][speed] > 0.0
+    assert seen[1][speed] == 0.0
+    present = [name for name, _, _ in ego_entries(CAR)].index("body0.present")
+    around = [make("Ego", **sensor).reset(seed=5)[0] for sensor in ({}, {"ego_sensor": NEAR})]
+    assert around[0][present] == 1.0
+    assert around[1][present] == 0.0
 
 
 def test_the_horizon_truncates(make: Make) -> None:
