@@ -84,7 +84,8 @@ def shares_plot(bars: Sequence[Bar], name: str) -> str:
             if bar.value is not None:
                 axes.barh(i, bar.value, height=0.5, color=SERIES[0], alpha=0.22, lw=0)
         axes.set_xlim(0.0, limit)
-        axes.xaxis.set_major_locator(MaxNLocator(5))
+        crowded = max((len(bar.label) for bar in bars), default=0) > LABEL // 2
+        axes.xaxis.set_major_locator(MaxNLocator(2 if crowded else 5))
         axes.xaxis.set_major_formatter(lambda x, _: f"{100 * x:.3g} %")
         return _svg(figure)
 
