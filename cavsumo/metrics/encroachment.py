@@ -22,8 +22,8 @@ def pet_tracks(times: ArrayLike, first: ArrayLike, second: ArrayLike) -> float:
     """Post-encroachment time of two tracks of boxes [s]; infinite if they share no place.
 
     The shortest time between the one's being at a place and the other's coming there, over all
-    places: the smallest |t_i - t_j| for which the first box at t_i overlaps the second at t_j. It is
-    0 for bodies that touch, and exact to a timestep. Where two ways cross it is the time between
+    places: the smallest |t_i - t_j| for which the first box at t_i overlaps the second at t_j. It
+    is 0 for bodies that touch, and exact to a timestep. Where two ways cross it is the time between
     the first one's leaving and the second one's entering the area that both sweep.
 
     Args:

@@ -1,4 +1,4 @@
-"""Two bodies anywhere on the plane: time to collision, closest approach, deceleration, encroachment.
+"""Two bodies anywhere on the plane: time to collision, deceleration, closest approach.
 
 Bodies are boxes or discs that keep their velocity and do not turn. Arrays of boxes have the shape
 (..., 5): x, y [m], heading [rad], length, width [m]; velocities (..., 2) [m/s]. Leading shapes

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Sequence
 from typing import Any
 
@@ -46,7 +47,9 @@ def cavgym_zones(
     zones = ego_speed > 0.0 and steering == 0.0
     touched = [overlap(Box(0.0, 0.0, 0.0, ego_length, ego_width), pedestrian)]
     if zones:
-        touched += [_touches(pedestrian, *pair, ego_width) for pair in (ends[:2], ends[1:])]
+        touched += [
+            _touches(pedestrian, begin, end, ego_width) for begin, end in itertools.pairwise(ends)
+        ]
     verdict = UNINTERESTING if any(touched[:2]) else INTERESTING if any(touched) else NONE
     return {
         "braking_m": braking,
