@@ -34,9 +34,14 @@ def settings_of(options: argparse.Namespace) -> dict[str, Any]:
         ("params", options.param),
         ("ego_params", options.ego_param),
         ("assertion_params", options.assert_param),
+        ("ego_sensor", options.ego_sensor),
+        ("tester_sensor", options.tester_sensor),
     ):
         if words:
-            settings[key] = settings.get(key, {}) | dict(assignment(key, w) for w in words)
+            table = settings.get(key, {})
+            if not isinstance(table, dict):
+                raise InputError(f"{key}: expected a table in the scenario file, got {table!r}")
+            settings[key] = table | dict(assignment(key, w) for w in words)
     return settings
 
 

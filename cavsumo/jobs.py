@@ -77,9 +77,14 @@ def tester_bodies(scenario: Scenario) -> tuple[Body, ...]:
     return bodies
 
 
+def failed_row(plan: BatchPlan, job: Job, message: str) -> Row:
+    """The row of an episode that could not be played."""
+    return head(plan, job) | {"outcome": "error", "error": message}
+
+
 def failed(plan: BatchPlan, job: Job, message: str, wall: float) -> Outcome:
     """The outcome of an episode that could not be played."""
-    return Outcome(head(plan, job) | {"outcome": "error", "error": message, "wall_s": wall})
+    return Outcome(failed_row(plan, job, message) | {"wall_s": wall})
 
 
 def head(plan: BatchPlan, job: Job) -> Row:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from inspect import Parameter
 from typing import Any
 
 from cavsumo.registry import Registry
@@ -20,9 +22,36 @@ def listing(sort: str, name: str | None) -> str:
     """One line for each entry, or one entry with its parameters, defaults and units."""
     registry = registries()[sort]
     if name is None:
-        width = max(map(len, registry))
-        return "\n".join(f"{n:{width}}  {registry.summary(n)}" for n in registry)
-    lines = [f"{name}: {registry.summary(name)}"]
-    shown = [(p, f"{p.name}={p.default}") for p in registry.parameters(name)]
-    width = max((len(text) for _, text in shown), default=0)
-    return "\n".join(lines + [f"  {text:{width}}  {p.doc}" for p, text in shown])
+        lines = {n: registry.summary(n) for n in registry}
+        return "\n".join(_columns(lines | (_forms() if sort == "egos" else {})))
+    if sort == "egos":
+        registry = _registry_of(name, registry)
+    name = name.partition(":")[0]
+    shown = {
+        f"{p.name}={p.default}": p.doc
+        for p in registry.parameters(name)
+        if p.default is not Parameter.empty  # what stands behind the colon
+    }
+    return "\n".join(
+        [f"{name}: {registry.summary(name)}", *(f"  {line}" for line in _columns(shown))]
+    )
+
+
+def _columns(lines: Mapping[str, str]) -> list[str]:
+    """Two columns, the first as wide as need be."""
+    width = max(map(len, lines), default=0)
+    return [f"{first:{width}}  {second}" for first, second in lines.items()]
+
+
+def _forms() -> dict[str, str]:
+    """How an ego from the user is named."""
+    from cavsumo.egos.specs import FORMS
+
+    return dict(FORMS)
+
+
+def _registry_of(ego: str, registered: Registry[Any]) -> Registry[Any]:
+    """Where the parameters of an ego are found: exec and tcp have a registry of their own."""
+    from cavsumo.egos.external import EXTERNAL
+
+    return EXTERNAL if ego.partition(":")[0] in EXTERNAL else registered

@@ -63,10 +63,12 @@ class Outcome:
     Attributes:
         row: its row, by column.
         trace: the frames worth keeping as JSON lines, empty for none.
+        ego_log: what an ego from outside printed, which may differ from run to run; mostly empty.
     """
 
     row: Row
     trace: str = ""
+    ego_log: str = ""
 
     @property
     def frames(self) -> list[dict[str, Any]]:

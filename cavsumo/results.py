@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 import csv
+import itertools
 import json
-from collections.abc import Iterator
+import math
+import re
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -24,6 +27,11 @@ HEADER = ",".join(COLUMNS) + "\n"
 def trace_name(csv_file: Path, run: int) -> str:
     """Where the trace of an episode lies, relative to the results file."""
     return f"{csv_file.stem}/run{run:06d}.jsonl"
+
+
+def ego_log_name(csv_file: Path, run: int) -> str:
+    """Where lies what the ego printed in an episode, relative to the results file."""
+    return f"{csv_file.stem}/run{run:06d}.ego.log"
 
 
 def read_manifest(csv_file: Path) -> dict[str, Any]:
@@ -115,13 +123,46 @@ def read_trace(file: Path) -> list[dict[str, Any]]:
     """The frames of a trace."""
     try:
         lines = file.read_text(encoding="utf-8").splitlines()
-        frames = [json.loads(line) for line in lines[1:]]
-        for found in frames:
-            if not set(found) >= FRAME_KEYS:
-                raise ValueError(f"a frame without {', '.join(sorted(FRAME_KEYS - set(found)))}")
-        return frames
+        return [_frame(line) for line in lines[1:]]
     except (OSError, ValueError, TypeError) as error:
         raise ResultsError(f"trace {str(file)!r}: cannot be read: {error}") from error
+
+
+def read_moments(file: Path, times: Sequence[float]) -> list[tuple[float, dict[str, Any]]]:
+    """For each time [s] the nearest frame of a trace, and how far the ego has driven by then [m].
+
+    Only those frames are parsed as a whole: traces are long, and a report reads thousands.
+    """
+    try:
+        with file.open(encoding="utf-8") as stream:
+            lines = stream.readlines()[1:]  # the first says whose trace it is
+        passing = list(map(_passing, lines))
+        steps = (math.dist(a[1:], b[1:]) for a, b in itertools.pairwise(passing))
+        driven = list(itertools.accumulate(steps, initial=0.0))
+        nearest = [min(range(len(lines)), key=lambda i: abs(passing[i][0] - t)) for t in times]
+        return [(driven[i], _frame(lines[i])) for i in nearest]
+    except (OSError, ValueError, TypeError) as error:
+        raise ResultsError(f"trace {str(file)!r}: cannot be read: {error}") from error
+
+
+_POSE = re.compile(r'"time_s":\s*([^,]+),\s*"ego":\s*\[([^,]+),([^,]+),')
+
+
+def _passing(line: str) -> tuple[float, float, float]:
+    """The time [s] and the ego's position [m] in a line of a trace."""
+    found = _POSE.search(line)
+    if found is None:
+        raise ValueError("a frame without time_s and ego, one after the other")
+    time, x, y = map(float, found.groups())
+    return time, x, y
+
+
+def _frame(line: str) -> dict[str, Any]:
+    """A line of a trace."""
+    found: dict[str, Any] = json.loads(line)
+    if not set(found) >= FRAME_KEYS:
+        raise ValueError(f"a frame without {', '.join(sorted(FRAME_KEYS - set(found)))}")
+    return found
 
 
 def read_results(csv_file: Path) -> pandas.DataFrame:

@@ -23,6 +23,7 @@ from pydantic import (
 
 from cavsumo.checks import densities
 from cavsumo.errors import InputError, UnknownName
+from cavsumo.sensors import Sensor
 
 SHARED_BY = 25  # episodes that share one simulation when asked to
 Finite = Annotated[float, Field(allow_inf_nan=False)]
@@ -45,7 +46,9 @@ class Scenario(BaseModel):
         "and kilometre of road, each direction counted, and of pavement; instead of routes",
     )
     additional: tuple[Path, ...] = Field((), description="SUMO additional files")
-    ego: str = Field("sumo", description="registered ego or module:Class")
+    ego: str = Field(
+        "sumo", description="registered ego, module:Class, exec:COMMAND or tcp:HOST:PORT"
+    )
     ego_params: Params = Field(default_factory=dict, description="parameters of the ego")
     ego_route: tuple[str, ...] = Field(
         (), description="edges of the ego's route, or one word: straight, left, right or u-turn"
@@ -74,6 +77,10 @@ class Scenario(BaseModel):
     sumo_width: Finite = Field(
         0.05, ge=0.01, le=5, description="width that SUMO is shown of a tester pedestrian [m]"
     )
+    ego_sensor: Sensor | None = Field(
+        None, description="how the ego sees the others; exactly and at once if not given"
+    )
+    tester_sensor: Sensor | None = Field(None, description="how the tester agents do")
     end: Finite = Field(60.0, gt=0, le=36000, description="horizon of an episode [s]")
     step_length: Finite = Field(0.1, ge=0.001, le=1, description="timestep lambda [s]")
     assertions: tuple[str, ...] = Field(
@@ -94,6 +101,12 @@ class Scenario(BaseModel):
     def _densities(cls, value: Any) -> Any:
         """One number for cars and pedestrians or two, as numbers or as text with a comma."""
         return None if value is None else densities(value)
+
+    @field_validator("ego_sensor", "tester_sensor")
+    @classmethod
+    def _full_observability(cls, value: Sensor | None) -> Sensor | None:
+        """A sensor that changes nothing is none."""
+        return None if value == Sensor() else value
 
     @field_validator("ego_route", mode="before")
     @classmethod
@@ -201,6 +214,7 @@ def part_of(text: str) -> tuple[int, int]:
 SCENARIO_KEYS = frozenset(Scenario.model_fields)
 PLAN_KEYS = frozenset(BatchPlan.model_fields) - {"scenario"}
 PATH_KEYS = ("net", "routes", "additional")
+SENSOR_KEYS = ("ego_sensor", "tester_sensor")
 
 
 def read_config(file: Path) -> dict[str, Any]:
@@ -257,6 +271,11 @@ def _check_keys(settings: Mapping[str, Any], source: str) -> None:
     for key in settings:
         if key not in SCENARIO_KEYS | PLAN_KEYS:
             raise UnknownName("key", key, SCENARIO_KEYS | PLAN_KEYS, source)
+    for sensor in SENSOR_KEYS:
+        given = settings.get(sensor)
+        for key in given if isinstance(given, Mapping) else ():
+            if key not in Sensor.model_fields:
+                raise UnknownName(f"key of {sensor}", key, Sensor.model_fields, source)
 
 
 def _route_file(scenario: Mapping[str, Any], source: str) -> Path | None:

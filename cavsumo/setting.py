@@ -21,6 +21,7 @@ from cavsumo.bodies import WALKING, Kind, kind_named
 from cavsumo.demand import BEYOND_S
 from cavsumo.egos import make_ego
 from cavsumo.egos.base import Ego
+from cavsumo.egos.specs import ego_files
 from cavsumo.errors import InputError
 from cavsumo.jobs import check_agents, learners, make_agents
 from cavsumo.options import OPTIONS
@@ -80,6 +81,11 @@ def prepare(plan: BatchPlan) -> Setting:
             "sequence; learn=false plays what was learned"
         )
     ego = make_ego(scenario.ego, scenario.ego_params)
+    if scenario.ego_sensor and type(ego).act is Ego.act:
+        raise InputError(
+            f"ego_sensor: ego {scenario.ego} is driven by SUMO, which sees everybody; a sensor "
+            "needs a controller, such as time-gap"
+        )
     site = derive_site(
         scenario.net, scenario.ego_route, scenario.junction, ego.kind, wishes(plan, kind, ego)
     )
@@ -139,10 +145,19 @@ def _types(plan: BatchPlan) -> tuple[str, ...]:
 
 
 def checksums(plan: BatchPlan) -> dict[str, str]:
-    """The SHA-256 of every file that a plan names."""
+    """The SHA-256 of every file that a plan names, its ego's among them."""
     scenario = plan.scenario
     files = [scenario.net, *([scenario.routes] if scenario.routes else []), *scenario.additional]
-    return {str(file): hashlib.sha256(file.read_bytes()).hexdigest() for file in files}
+    return {str(file): _sha256(file) for file in (*files, *ego_files(scenario.ego))}
+
+
+def _sha256(file: Path) -> str:
+    """The SHA-256 of a file, which may be large."""
+    try:
+        with file.open("rb") as stream:
+            return hashlib.file_digest(stream, "sha256").hexdigest()
+    except OSError as error:
+        raise InputError(f"{str(file)!r}: cannot be read: {error.strerror}") from error
 
 
 def versions() -> dict[str, str]:

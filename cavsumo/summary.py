@@ -97,13 +97,13 @@ def _say_first(tally: Tally, csv_file: Path, console: Console) -> None:
         if row is not None:
             _say(
                 console,
-                f"first {what}: run {row['run']} ({row['agent']}): {_event(row)}"
+                f"first {what}: run {row['run']} ({row['agent']}): {event(row)}"
                 f"\n       cavsumo replay {csv_file} {row['run']}",
             )
             return
 
 
-def _event(row: Row) -> str:
+def event(row: Row) -> str:
     """What happened in a test, when and with whom."""
     violated = is_failure(row)
     when = float(row["violation_time_s"] if violated else row["trigger_time_s"])

@@ -7,8 +7,8 @@ from collections.abc import Sequence
 from typing import Any
 
 from cavsumo.agents import Agent
-from cavsumo.errors import CavsumoError
-from cavsumo.jobs import Job, episode_seed, failed, head, make_agents
+from cavsumo.errors import CavsumoError, EgoError
+from cavsumo.jobs import Job, episode_seed, failed_row, head, make_agents
 from cavsumo.outcomes import Outcome, Row, frame, trace_text
 from cavsumo.scenario import BatchPlan, Simulation
 from cavsumo.simulator import Episode, play
@@ -30,9 +30,17 @@ class Theatre:
     def __exit__(self, *_: object) -> None:
         self.stage.close()
 
-    def rehearse(self) -> None:
-        """Start the ego and SUMO once: what they refuse comes out before anything is written."""
-        self.stage.ego.prepare(self.stage.mission)
+    def rehearse(self, *, strict: bool = True) -> None:
+        """Start the ego and SUMO once: what they refuse comes out before anything is written.
+
+        In the middle of a batch, not ``strict``, an ego that cannot be started is no refusal: each
+        episode tries again, and is an error if that fails.
+        """
+        try:
+            self.stage.ego.prepare(self.stage.mission)
+        except EgoError:
+            if strict:
+                raise
         simulation: Simulation = "own" if self.plan.reset == "fresh" else "new"
         self.stage.world.reset(episode_seed(self.plan.seed, 0), (), (), simulation=simulation)
 
@@ -53,9 +61,9 @@ class Theatre:
             memory = _recall(agents)
         except Exception as error:  # whatever it is, it costs this row and no other
             said = str(error) if isinstance(error, CavsumoError) else f"defect: {error!r}"
-            return failed(self.plan, job, said, time.perf_counter() - begun), job.memory
+            row, trace, memory = failed_row(self.plan, job, said), "", job.memory
         row["wall_s"] = time.perf_counter() - begun
-        return Outcome(row, trace), memory
+        return Outcome(row, trace, self.stage.ego.take_log()), memory
 
     def _cast(self, job: Job) -> list[Agent]:
         """The agents of a job, with their memory."""

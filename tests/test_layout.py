@@ -16,26 +16,30 @@ PACKAGE = Path(cavsumo.__file__).parent
 
 # From the ground up: a module uses only what stands before it, lazily or not.
 ORDER = """
-    cavsumo errors checks registry kinematics geometry paths bodies snapshot fairness roads
-    sumo_poses background
+    cavsumo errors checks registry processes kinematics geometry paths bodies snapshot fairness
+    roads sumo_poses background
     metrics.following metrics.rss metrics.highway_code metrics.zones metrics.plane
     metrics.encroachment metrics
     network ego_routes lane_chains approaches starts vehicle_starts kerbs signals trips traffic
-    site scene
+    site scene sight sensors
     osm handedness netconvert facts inspection layers picture
     agents.base agents.walking agents.driving agents.triggers agents.random agents.features
     agents.manoeuvres agents.behaviours agents.programmed agents.election agents.qlearning agents
     contacts
     assertions.base assertions.collision assertions.reaction_zone assertions
-    egos.base egos.constant egos.sumo egos.time_gap egos.controller egos
+    egos.base egos.constant egos.sumo egos.time_gap egos.effectors egos.controller
+    egos.protocol egos.link egos.child egos.wire egos.external egos.specs egos
     options scenario outcomes rewards sumo_types demand simulations world
     jobs stage simulator setting theatre worker_process worker batch executors
     statistics tally stopping results recorder learning progress session
     summary interrupts replays listings
+    report report.load report.grouping report.rates report.pairs report.compare report.survival
+    report.effort report.events report.distinct report.analysis report.tables report.figures
+    report.formats report.junit
     testing.scripts testing.ego_checks testing.agent_checks testing.assertion_checks testing
-    commands commands.run commands.replay commands.merge commands.inspect commands.import_osm
-    commands.check_ego
-    cli_settings cli_egos cli_networks cli __main__
+    commands commands.run commands.replay commands.merge commands.report commands.inspect
+    commands.import_osm commands.check_ego
+    cli_settings cli_egos cli_networks cli_results cli __main__
 """.split()
 
 HEAVY = {"numpy", "pandas", "scipy", "shapely", "libsumo", "sumolib", "pydantic", "rich"}

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import itertools
 import re
 import shlex
+import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -12,6 +14,7 @@ import pytest
 
 ROOT = Path(__file__).resolve().parents[1]
 README = (ROOT / "README.md").read_text(encoding="utf-8")
+REPORTS = sorted(set(re.findall(r"^cavsumo report [^`\n]*", README, re.MULTILINE)))
 COMMANDS = sorted(set(re.findall(r"cavsumo run [^`\n]*", README)))
 
 
@@ -26,7 +29,7 @@ def cavsumo(words: list[str], folder: Path) -> subprocess.CompletedProcess[str]:
 def checkout(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A folder as the README's reader has it, with the files that the README shows."""
     folder = tmp_path_factory.mktemp("checkout")
-    for name in ("networks", "routes"):
+    for name in ("networks", "routes", "examples"):
         (folder / name).symlink_to(ROOT / name)
     example = re.search(r"<!-- example: (\S+) -->\n```python\n(.*?)```", README, re.DOTALL)
     scenario = re.search(r"```toml\n(.*?)```", README, re.DOTALL)
@@ -46,11 +49,28 @@ def test_each_run_command_of_the_readme_runs(command: str, checkout: Path) -> No
     words = shlex.split(command, comments=True)[1:]
     if "--scheduler" in words:
         pytest.skip("there is no cluster of that name; tests/test_executors.py has one")
+    if "tcp:127.0.0.1:5000" in words:
+        pytest.skip("nobody listens there; tests/test_external_egos.py has the server")
     if not {"--help", "--resume", "--retry-errors"} & set(words):
         words += ["--runs", "1", "-o", "readme.csv"]
     done = cavsumo(words, checkout)
     assert done.returncode in (0, 1), done.stderr
     assert "Traceback" not in done.stderr
+
+
+@pytest.mark.parametrize("command", REPORTS)
+def test_each_report_of_the_readme_is_written(command: str, checkout: Path) -> None:
+    """The files it names are read, those after -o and --junit written."""
+    words = shlex.split(command)[1:]
+    for name in words:
+        if name.endswith(".csv") and name != "results.csv":
+            shutil.copy(checkout / "results.csv", checkout / name)
+            shutil.copy(checkout / "results.json", checkout / f"{Path(name).stem}.json")
+    done = cavsumo(words, checkout)
+    assert (done.returncode, done.stderr) == (0, "")
+    for option, file in itertools.pairwise(words):
+        if option in ("-o", "--junit"):
+            assert (checkout / file).stat().st_size > 0
 
 
 def test_the_agents_of_the_readme_are_those_that_there_are(checkout: Path) -> None:
