@@ -12,7 +12,6 @@ import numpy as np
 
 from cavsumo.agents import AGENTS, Agent
 from cavsumo.bodies import Body, kind_named, model_of
-from cavsumo.errors import UnknownName
 from cavsumo.outcomes import Outcome, Row
 from cavsumo.scenario import BatchPlan, Scenario, Simulation
 
@@ -53,8 +52,7 @@ def job(plan: BatchPlan, run: int, memory: tuple[Any, ...] | None = None) -> Job
 
 def make_agents(plan: BatchPlan, name: str) -> list[Agent]:
     """The agents of one name, one for each team."""
-    known = {name: [p.name for p in AGENTS.parameters(name)]}
-    params = plan.agent_params(name, known)
+    params = AGENTS.shared(plan.agents, plan.params)[name]
     return [AGENTS.make(name, params) for _ in teams(plan.scenario)]
 
 
@@ -104,12 +102,5 @@ def head(plan: BatchPlan, job: Job) -> Row:
 
 def check_agents(plan: BatchPlan) -> None:
     """Build every agent once and account for every parameter, before anything starts."""
-    known = {name: [p.name for p in AGENTS.parameters(name)] for name in plan.agents}
-    shared = {key for keys in known.values() for key in keys}
-    qualified = {f"{name}.{key}" for name, keys in known.items() for key in keys}
-    for key in plan.params:
-        valid = qualified if "." in key else shared
-        if key not in valid:
-            raise UnknownName("parameter", key, valid, f"agent {' '.join(plan.agents)}")
     for name in plan.agents:
         make_agents(plan, name)

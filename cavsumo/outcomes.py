@@ -27,7 +27,11 @@ COLUMNS: Mapping[str, str] = {
     "sumo_width_m": "width that SUMO was shown of a tester pedestrian",
     "seed": "the episode's seed, derived from the batch's seed and the number of the episode",
     "outcome": "violated, held, not_triggered, unfair or error",
-    "assertion": "the assertion first violated, else triggered",
+    "assertion": "the assertion first violated, else first triggered; one without a precondition "
+    "only if violated or alone",
+    "verdicts": "what every assertion said: NAME=verdict, with blanks between",
+    "robustness": "smallest margin of that assertion since its trigger, in its unit (docs/"
+    "assertions.md); negative if and only if violated",
     "tester": "the tester's body involved",
     "trigger_time_s": "when the precondition triggered",
     "violation_time_s": "when the assertion was violated",
@@ -117,6 +121,17 @@ def frame(snapshot: Snapshot) -> dict[str, Any]:
 
 def _pose(state: BodyState) -> list[float]:
     return [state.x, state.y, state.v, state.o]
+
+
+def verdicts_cell(verdicts: Mapping[str, str]) -> str:
+    """What every assertion said, as it stands in the CSV."""
+    return " ".join(f"{name}={verdict}" for name, verdict in verdicts.items())
+
+
+def verdicts_of(row: Mapping[str, Any]) -> dict[str, str]:
+    """What every assertion said of an episode; nothing where that was not recorded."""
+    said = str(row.get("verdicts") or "").split()
+    return {name: verdict for name, _, verdict in (word.rpartition("=") for word in said)}
 
 
 def is_test(row: Mapping[str, Any]) -> bool:

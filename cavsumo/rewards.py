@@ -31,6 +31,7 @@ class Ledger:
         self.cost = self.total = 0.0
         self._dt, self._roads, self._teams = scene.dt, scene.roads, teams
         self._over = False
+        self._names = {body.id for body in scene.bodies}
         # Whether a body is on the carriageway, where that was looked up, and how far from there it
         # cannot change; asking the map is dear, so it is asked no earlier.
         self._on_road = [False] * len(scene.bodies)
@@ -57,7 +58,7 @@ class Ledger:
             for a, team in enumerate(self._teams):
                 rewards[a] -= self._dt * ROAD_COST * sum([on_road[i] for i in team])
         for judgement in judgements:
-            if judgement.tester:  # somebody reached the goal, or spoilt it
+            if judgement.tester in self._names:  # somebody reached the goal, or spoilt it
                 self._over = True
                 for a, team in enumerate(self._teams):
                     if judgement.triggered and judgement.tester in [testers[i].id for i in team]:

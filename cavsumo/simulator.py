@@ -6,13 +6,13 @@ The truth about the testers' bodies is integrated here by the kinematics; the wo
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
 
 from cavsumo.agents.base import Agent
-from cavsumo.assertions.base import SEVERITY, Assertion, Judgement
+from cavsumo.assertions.base import Assertion, Judgement, weightiest
 from cavsumo.bodies import Action, Kind
 from cavsumo.contacts import ContactMonitor
 from cavsumo.egos.base import Drive, Ego
@@ -35,6 +35,7 @@ class Episode:
     """What happened, while and after it happens."""
 
     judgement: Judgement
+    verdicts: Mapping[str, str] = field(default_factory=dict)
     steps: int = 0
     time: float = 0.0
     max_decel: float = 0.0
@@ -146,9 +147,7 @@ def _reset(
     ego = stage.world.ego_body
     starts = stage.site.draw(kinds, ego.kind, stage.start_speed, placing)
     site = stage.site
-    scene = Scene(
-        stage.world.dt, ego, site.route.path, stage.bodies, starts, site.roads, site.lights, seed
-    )
+    scene = site.scene(stage.world.dt, ego, stage.bodies, starts, seed)
     watching: list[Ego | Agent | Assertion] = [stage.ego, *agents, *stage.assertions]
     # Vehicles keep their distance to whoever is ahead of them, so they see everybody.
     driving = any(start.approach for start in starts)
@@ -274,8 +273,8 @@ def _at_end(scene: Scene, snapshot: Snapshot) -> bool:
 
 def _finished(stage: Stage, episode: Episode, snapshot: Snapshot, ledger: Ledger) -> Episode:
     """The episode with its totals."""
-    judgements = [a.judgement for a in stage.assertions]
-    episode.judgement = min(judgements, key=lambda j: SEVERITY.index(j.verdict))
+    episode.judgement = weightiest(stage.assertions)
+    episode.verdicts = {a.name: a.judgement.verdict for a in stage.assertions}
     episode.steps, episode.time = snapshot.step, snapshot.time
     episode.cost, episode.reward = ledger.cost, ledger.total
     world = stage.world

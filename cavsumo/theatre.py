@@ -7,9 +7,10 @@ from collections.abc import Sequence
 from typing import Any
 
 from cavsumo.agents import Agent
+from cavsumo.assertions.base import VIOLATED, Judgement
 from cavsumo.errors import CavsumoError, EgoError
 from cavsumo.jobs import Job, episode_seed, failed_row, head, make_agents
-from cavsumo.outcomes import Outcome, Row, frame, trace_text
+from cavsumo.outcomes import Outcome, Row, frame, trace_text, verdicts_cell
 from cavsumo.scenario import BatchPlan, Simulation
 from cavsumo.simulator import Episode, play
 from cavsumo.site import Site
@@ -90,6 +91,8 @@ def _row(plan: BatchPlan, job: Job, episode: Episode) -> Row:
     return head(plan, job) | {
         "outcome": judgement.verdict,
         "assertion": judgement.assertion if judgement.triggered else "",
+        "verdicts": verdicts_cell(episode.verdicts),
+        "robustness": _signed(judgement),
         "tester": judgement.tester,
         "trigger_time_s": judgement.trigger_time,
         "violation_time_s": judgement.violation_time,
@@ -108,6 +111,12 @@ def _row(plan: BatchPlan, job: Job, episode: Episode) -> Row:
         "emergency_stops": episode.emergency_stops,
         "teleports": episode.teleports,
     }
+
+
+def _signed(said: Judgement) -> float | None:
+    """The robustness as the CSV has it: rounded, what is violated stays below zero."""
+    value = said.robustness
+    return min(value, -0.001) if value is not None and said.verdict == VIOLATED else value
 
 
 def _recall(agents: Sequence[Agent]) -> tuple[Any, ...] | None:
