@@ -14,8 +14,9 @@ import numpy as np
 from cavsumo.agents import Agent
 from cavsumo.agents.policy import make_agent, parameters_of, policy_file
 from cavsumo.bodies import Body, kind_named, model_of
-from cavsumo.errors import InputError, UnknownName
+from cavsumo.errors import InputError
 from cavsumo.outcomes import Outcome, Row
+from cavsumo.registry import shared
 from cavsumo.scenario import BatchPlan, Scenario, Simulation
 
 
@@ -55,9 +56,15 @@ def job(plan: BatchPlan, run: int, memory: tuple[Any, ...] | None = None) -> Job
 
 def make_agents(plan: BatchPlan, name: str) -> list[Agent]:
     """The agents of one name, one for each team."""
-    known = {name: [p.name for p in parameters_of(name)]}
-    params = plan.agent_params(name, known)
+    params = _params(plan)[name]
     return [make_agent(name, params) for _ in teams(plan.scenario)]
+
+
+def _params(plan: BatchPlan) -> dict[str, dict[str, Any]]:
+    """The parameters of each agent; raises UnknownName for one that none of them has."""
+    return shared(
+        "agent", {n: {p.name for p in parameters_of(n)} for n in plan.agents}, plan.params
+    )
 
 
 def policy_files(plan: BatchPlan) -> list[Path]:
@@ -111,13 +118,6 @@ def head(plan: BatchPlan, job: Job) -> Row:
 
 def check_agents(plan: BatchPlan) -> None:
     """Build every agent once and account for every parameter, before anything starts."""
-    known = {name: [p.name for p in parameters_of(name)] for name in plan.agents}
-    shared = {key for keys in known.values() for key in keys}
-    qualified = {f"{name}.{key}" for name, keys in known.items() for key in keys}
-    for key in plan.params:
-        valid = qualified if "." in key else shared
-        if key not in valid:
-            raise UnknownName("parameter", key, valid, f"agent {' '.join(plan.agents)}")
     kind = kind_named(plan.scenario.kind)
     for name in plan.agents:
         for agent in make_agents(plan, name)[:1]:

@@ -25,8 +25,15 @@ COLUMNS: Mapping[str, str] = {
     "embodiment": "how SUMO was shown the testers: vehicle or person",
     "sumo_width_m": "width that SUMO was shown of a tester pedestrian",
     "seed": "the episode's seed, derived from the batch's seed and the number of the episode",
-    "outcome": "violated, held, not_triggered, unfair or error",
-    "assertion": "the assertion first violated, else triggered",
+    "outcome": "violated, held, not_triggered, unfair, invalid or error",
+    "invalid": "which tester broke which rule of the world before the verdict, and when",
+    "blame": "which party broke which rule first when outcome is violated, as PARTY:rule; a hint, "
+    "not law (docs/fairness.md); empty if no rule tells",
+    "assertion": "the assertion first violated, else first triggered; one without a precondition "
+    "only if violated or alone",
+    "verdicts": "what every assertion said: NAME=verdict, with blanks between",
+    "robustness": "smallest margin of that assertion since its trigger, in its unit (docs/"
+    "assertions.md); negative if and only if violated",
     "tester": "the tester's body involved",
     "trigger_time_s": "when the precondition triggered",
     "violation_time_s": "when the assertion was violated",
@@ -41,6 +48,8 @@ COLUMNS: Mapping[str, str] = {
     "max_decel_mps2": "hardest braking of the ego",
     "avoidable": "whether the ego could still have avoided it (not judged in this version)",
     "cost": "time that the testers spent on the carriageway, together [s]",
+    "accel_rms_mps2": "root mean square of the testers' accelerations over all timesteps",
+    "turning_rad": "how far the testers turned, to either side, together",
     "reward": "the testers' return, undiscounted",
     "contacts": "bodies that touched the ego, standing or moving",
     "tester_contacts": "pairs of a tester and a body other than the ego that touched",
@@ -93,6 +102,17 @@ def row_line(row: Mapping[str, Any]) -> str:
     cells = [cell(row.get(column)) for column in COLUMNS]
     csv.writer(line, lineterminator="\n").writerow(cells)
     return line.getvalue()
+
+
+def verdicts_cell(verdicts: Mapping[str, str]) -> str:
+    """What every assertion said, as it stands in the CSV."""
+    return " ".join(f"{name}={verdict}" for name, verdict in verdicts.items())
+
+
+def verdicts_of(row: Mapping[str, Any]) -> dict[str, str]:
+    """What every assertion said of an episode; nothing where that was not recorded."""
+    said = str(row.get("verdicts") or "").split()
+    return {name: verdict for name, _, verdict in (word.rpartition("=") for word in said)}
 
 
 def is_test(row: Mapping[str, Any]) -> bool:

@@ -31,6 +31,7 @@ class Ledger:
         self.cost = self.total = 0.0
         self._dt, self._roads, self._teams = scene.dt, scene.roads, teams
         self._over = False
+        self._names = {body.id for body in scene.bodies}
         # Whether a body is on the carriageway, where that was looked up, and how far from there it
         # cannot change; asking the map is dear, so it is asked no earlier.
         self._on_road = [False] * len(scene.bodies)
@@ -38,8 +39,13 @@ class Ledger:
         self._seen: tuple[BodyState, ...] = ()
         self._waiting = [-self._dt * TIME_COST] * len(teams)  # with nobody on the road
 
-    def rewards(self, successor: Snapshot, judgements: Sequence[Judgement]) -> Feedback | None:
-        """Each agent's reward for a timestep and whether the game ends; None once it is over."""
+    def rewards(
+        self, successor: Snapshot, judgements: Sequence[Judgement], *, valid: bool = True
+    ) -> Feedback | None:
+        """Each agent's reward for a timestep and whether the game ends; None once it is over.
+
+        ``valid``: no tester broke the rules of the world; else the goal is worth nothing.
+        """
         testers, on_road = successor.testers, self._on_road
         if testers is not self._seen:
             self._seen = testers
@@ -57,10 +63,11 @@ class Ledger:
             for a, team in enumerate(self._teams):
                 rewards[a] -= self._dt * ROAD_COST * sum([on_road[i] for i in team])
         for judgement in judgements:
-            if judgement.tester:  # somebody reached the goal, or spoilt it
+            if judgement.tester in self._names:  # somebody reached the goal, or spoilt it
                 self._over = True
                 for a, team in enumerate(self._teams):
-                    if judgement.triggered and judgement.tester in [testers[i].id for i in team]:
+                    names = [testers[i].id for i in team]
+                    if valid and judgement.triggered and judgement.tester in names:
                         rewards[a] += GOAL
         self.total += sum(rewards)
         return rewards, self._over

@@ -64,6 +64,38 @@ class Light(NamedTuple):
     along: float
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class MarkedCrossing:
+    """A marked pedestrian crossing on the ego's way.
+
+    Attributes:
+        id: of the crossing in the network.
+        begin, end: where the ego's path enters and leaves its surface [m].
+        surface: the crossing.
+        signalled: whether traffic lights control it.
+        priority: whether pedestrians on it go before vehicles, as on a zebra crossing.
+    """
+
+    id: str
+    begin: float
+    end: float
+    surface: shapely.Geometry
+    signalled: bool
+    priority: bool
+
+
+class Limit(NamedTuple):
+    """A speed limit on the ego's way, until the next one.
+
+    Attributes:
+        along: arc length on the ego's path from which it holds [m].
+        speed: [m/s].
+    """
+
+    along: float
+    speed: float
+
+
 # How a vehicle's way lies to the ego's: across it, into its lane, on its lane ahead of it, in a
 # lane beside it.
 APPROACHES = ("crossing", "merging", "following", "adjacent")

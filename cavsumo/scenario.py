@@ -102,6 +102,12 @@ class Scenario(BaseModel):
         """One number for cars and pedestrians or two, as numbers or as text with a comma."""
         return None if value is None else densities(value)
 
+    @field_validator("assertion_params", mode="before")
+    @classmethod
+    def _of_one(cls, value: Any) -> Any:
+        """``NAME.KEY`` for one of several assertions, in TOML also as a table of its own."""
+        return qualified(value)
+
     @field_validator("ego_sensor", "tester_sensor")
     @classmethod
     def _full_observability(cls, value: Sensor | None) -> Sensor | None:
@@ -148,6 +154,12 @@ class BatchPlan(BaseModel):
     )
     budget_s: Finite | None = Field(None, gt=0, description="stop after so much real time [s]")
 
+    @field_validator("params", mode="before")
+    @classmethod
+    def _of_one(cls, value: Any) -> Any:
+        """``NAME.KEY`` for one of several agents, in TOML also as a table of its own."""
+        return qualified(value)
+
     @field_validator("until_half_width", mode="before")
     @classmethod
     def _as_text(cls, value: Any) -> Any:
@@ -182,13 +194,16 @@ class BatchPlan(BaseModel):
         """How many episodes that are."""
         return self.runs * len(self.agents) if self.shard is None else sum(1 for _ in self.todo())
 
-    def agent_params(self, agent: str, known: Mapping[str, list[str]]) -> Params:
-        """The parameters meant for one agent: its own (``agent.key``) and those it knows."""
-        prefix = f"{agent}."
-        mine = {k: v for k, v in self.params.items() if "." not in k and k in known[agent]}
-        return mine | {
-            k.removeprefix(prefix): v for k, v in self.params.items() if k.startswith(prefix)
-        }
+
+def qualified(params: Any) -> Any:
+    """Parameters with those of inner tables under their full names, ``TABLE.KEY``."""
+    if not isinstance(params, Mapping):
+        return params
+    flat: dict[str, Any] = {}
+    for key, value in params.items():
+        inner = isinstance(value, Mapping)
+        flat |= {f"{key}.{k}": v for k, v in value.items()} if inner else {key: value}
+    return flat
 
 
 def half_width(text: str) -> tuple[float, bool]:

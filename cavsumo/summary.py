@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from pathlib import Path
 
 from rich.console import Console
 from rich.table import Table
 
+from cavsumo.assertions.base import HELD, UNFAIR, VIOLATED
 from cavsumo.outcomes import cell, is_failure
 from cavsumo.statistics import Rate
 from cavsumo.tally import Found, Row, Tally
@@ -26,6 +28,9 @@ def summarise(
     """
     console = Console(width=WIDTH)
     console.print(_table(tally, sequential), highlight=False)
+    if any(len(found.verdicts) > 1 for found in tally.agents.values()):
+        console.print()
+        console.print(_verdicts(tally), highlight=False)
     if sequential:
         _say(console, "intervals: beta-binomial confidence sequences, valid whenever one stops")
     together = tally.all
@@ -70,6 +75,28 @@ def _table(tally: Tally, sequential: bool) -> Table:
         table.add_column(title, justify="right", no_wrap=True)
     for agent, found in tally.agents.items():
         table.add_row(agent, *_cells(found, sequential))
+    return table
+
+
+def _verdicts(tally: Tally) -> Table:
+    """One line an agent and assertion: what it said in how many episodes."""
+    table = _ruled("assertion", "agent")
+    for title in ("triggered", "held", "violated", "unfair"):
+        table.add_column(title, justify="right", no_wrap=True)
+    names = dict.fromkeys(name for found in tally.agents.values() for name in found.verdicts)
+    for name in names:
+        for agent, found in tally.agents.items():
+            said = found.verdicts.get(name, Counter())
+            counts = said[HELD] + said[VIOLATED], said[HELD], said[VIOLATED], said[UNFAIR]
+            table.add_row(name, agent, *map(str, counts))
+    return table
+
+
+def _ruled(*titles: str) -> Table:
+    """A table without lines, with these columns of words."""
+    table = Table(box=None, pad_edge=False, padding=(0, 2, 0, 0))
+    for title in titles:
+        table.add_column(title)
     return table
 
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from cavsumo.assertions.base import HELD, UNFAIR, VIOLATED
-from cavsumo.outcomes import cell, is_failure, is_test
+from cavsumo.outcomes import cell, is_failure, is_test, verdicts_of
 from cavsumo.statistics import Rate, rate, sequential_rate
 
 Row = Mapping[str, Any]
@@ -23,11 +23,13 @@ class Found:
         outcomes: how often each outcome came out.
         fresh: how many rows are of episodes in a simulation of their own.
         times: when tests were triggered, by time [s] to three decimals.
+        verdicts: for each assertion, how often it said what.
     """
 
     outcomes: Counter[str] = field(default_factory=Counter)
     fresh: int = 0
     times: Counter[float] = field(default_factory=Counter)
+    verdicts: dict[str, Counter[str]] = field(default_factory=dict)
 
     @property
     def episodes(self) -> int:
@@ -93,6 +95,8 @@ class Tally:
         self.rows += 1
         found.outcomes[row["outcome"]] += 1
         found.fresh += row.get("reset") == "fresh"
+        for name, verdict in verdicts_of(row).items():
+            found.verdicts.setdefault(name, Counter())[verdict] += 1
         if is_test(row):
             found.times[float(cell(row["trigger_time_s"]))] += 1
             self.first.setdefault("test", row)

@@ -1,6 +1,6 @@
 """Whether the testers keep to the rules of the world: a test that breaks them proves nothing.
 
-What a body of a tester must not do until the verdict (docs/fairness.md says why, and what it costs):
+What a body of a tester must not do until the verdict (docs/fairness.md says why):
 
 * start in another body;
 * get into another body by its own movement, deeper than people and vehicles can: a body that
