@@ -26,7 +26,8 @@ COLUMNS: Mapping[str, str] = {
     "sumo_width_m": "width that SUMO was shown of a tester pedestrian",
     "seed": "the episode's seed, derived from the batch's seed and the number of the episode",
     "outcome": "violated, held, not_triggered, unfair, invalid or error",
-    "invalid": "which tester broke which rule of the world before the verdict, and when",
+    "breach": "which tester broke which rule of the world before the verdict, and when: the "
+    "one that makes the episode invalid, else the first",
     "blame": "which party broke which rule first when outcome is violated, as PARTY:rule; a hint, "
     "not law (docs/fairness.md); empty if no rule tells",
     "assertion": "the assertion first violated, else first triggered; one without a precondition "

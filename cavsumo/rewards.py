@@ -7,7 +7,7 @@ carriageway cost. Everything else, an unfair episode included, is worth nothing.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Container, Sequence
 
 from cavsumo.assertions.base import Judgement
 from cavsumo.scene import Scene
@@ -40,11 +40,11 @@ class Ledger:
         self._waiting = [-self._dt * TIME_COST] * len(teams)  # with nobody on the road
 
     def rewards(
-        self, successor: Snapshot, judgements: Sequence[Judgement], *, valid: bool = True
+        self, successor: Snapshot, judgements: Sequence[Judgement], cheats: Container[str] = ()
     ) -> Feedback | None:
         """Each agent's reward for a timestep and whether the game ends; None once it is over.
 
-        ``valid``: no tester broke the rules of the world; else the goal is worth nothing.
+        ``cheats``: bodies that broke the rules of the world, who earn nothing by the goal.
         """
         testers, on_road = successor.testers, self._on_road
         if testers is not self._seen:
@@ -67,7 +67,8 @@ class Ledger:
                 self._over = True
                 for a, team in enumerate(self._teams):
                     names = [testers[i].id for i in team]
-                    if valid and judgement.triggered and judgement.tester in names:
+                    fair = judgement.triggered and judgement.tester not in cheats
+                    if fair and judgement.tester in names:
                         rewards[a] += GOAL
         self.total += sum(rewards)
         return rewards, self._over

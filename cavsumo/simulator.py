@@ -45,6 +45,7 @@ class Episode:
     contacts: ContactMonitor = field(default_factory=ContactMonitor)
     conduct: Conduct = field(default_factory=Conduct)
     breach: Breach | None = None
+    invalid: bool = False
     blame: str = ""
     rms_acceleration: float = 0.0
     cost: float = 0.0
@@ -57,7 +58,7 @@ class Episode:
     @property
     def outcome(self) -> str:
         """What came out: the verdict, unless a tester broke the rules of the world before it."""
-        return INVALID if self.breach else self.judgement.verdict
+        return INVALID if self.invalid else self.judgement.verdict
 
 
 class Performance:
@@ -117,7 +118,7 @@ class Performance:
             episode.max_decel = braking
         self._observe(successor)
         judgements = [a.judgement for a in stage.assertions]
-        rewards = self._ledger.rewards(successor, judgements, valid=episode.breach is None)
+        rewards = self._ledger.rewards(successor, judgements, self._umpire.breaches)
         self._show(successor)
         if self._learners:
             _feed_back(agents, views, actions, rewards, self.agent_views)
@@ -138,12 +139,14 @@ class Performance:
     @property
     def outcome(self) -> str:
         """What came out so far."""
-        return INVALID if self._episode.breach else self.judgement.verdict
+        return INVALID if self._umpire.spoils(self.judgement) else self.judgement.verdict
 
     def finished(self) -> Episode:
         """What happened, or what happened so far."""
         episode = _finished(self._stage, self._episode, self.snapshot, self._ledger)
         episode.rms_acceleration = episode.conduct.rms_acceleration(episode.steps, self.scene.dt)
+        spoilt = self._umpire.spoils(episode.judgement)
+        episode.invalid, episode.breach = spoilt is not None, spoilt or self._umpire.first
         if episode.outcome == VIOLATED:
             episode.blame = blamed(self.scene, self._history, episode.judgement)
         return episode
@@ -157,7 +160,6 @@ class Performance:
         contacts = episode.contacts.observe(snapshot)
         if not any(a.judgement.verdict == VIOLATED for a in assertions):
             self._umpire.observe(snapshot, episode.contacts.pairs)
-            episode.breach = self._umpire.breach
         episode.conduct.observe(snapshot)
         for assertion in assertions:
             assertion.observe(snapshot, contacts)

@@ -8,7 +8,7 @@ from pathlib import Path
 from rich.console import Console
 from rich.table import Table
 
-from cavsumo.assertions.base import HELD, UNFAIR, VIOLATED
+from cavsumo.assertions.base import HELD, INVALID, UNFAIR, VIOLATED
 from cavsumo.outcomes import cell, is_failure
 from cavsumo.statistics import Rate
 from cavsumo.tally import Found, Row, Tally
@@ -49,6 +49,13 @@ def summarise(
         f"\n{together.tests} tests in {tally.rows} episodes, {together.failures} of them failed "
         f"by the ego.  {files}",
     )
+    invalid = tally.first.get(INVALID)
+    if invalid:
+        _say(
+            console,
+            f"{together.invalid} are invalid, a tester broke the rules of the world; "
+            f"run {invalid['run']}: {invalid['breach']}",
+        )
     error = tally.first.get("error")
     if error:
         _say(
@@ -71,10 +78,11 @@ def _table(tally: Tally, sequential: bool) -> Table:
     table.add_column("agent", overflow="fold")  # a path may be long
     for title in ("runs", "tests", "rate", "95 % interval", "failures", "of tests"):
         table.add_column(title, justify="right", no_wrap=True)
-    for title in ("unfair", "errors", "median time"):
+    invalid = bool(tally.all.invalid)
+    for title in ("unfair", *(["invalid"] if invalid else []), "errors", "median time"):
         table.add_column(title, justify="right", no_wrap=True)
     for agent, found in tally.agents.items():
-        table.add_row(agent, *_cells(found, sequential))
+        table.add_row(agent, *_cells(found, sequential, invalid))
     return table
 
 
@@ -100,8 +108,8 @@ def _ruled(*titles: str) -> Table:
     return table
 
 
-def _cells(found: Found, sequential: bool) -> list[str]:
-    """The cells of one agent."""
+def _cells(found: Found, sequential: bool, invalid: bool) -> list[str]:
+    """The cells of one agent; ``invalid``: with the number of invalid episodes."""
     tests, failures = (found.rate(r, sequential=sequential) for r in ("tests", "failures"))
     median = found.median_time()
     return [
@@ -112,6 +120,7 @@ def _cells(found: Found, sequential: bool) -> list[str]:
         str(found.failures),
         f"{percent(failures.value)} {interval(failures)}".strip(),
         str(found.unfair),
+        *([str(found.invalid)] if invalid else []),
         str(found.errors),
         "" if median is None else f"{median:.1f} s",
     ]

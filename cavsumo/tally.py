@@ -7,7 +7,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
-from cavsumo.assertions.base import HELD, UNFAIR, VIOLATED
+from cavsumo.assertions.base import HELD, INVALID, UNFAIR, VIOLATED
 from cavsumo.outcomes import cell, is_failure, is_test, verdicts_of
 from cavsumo.statistics import Rate, rate, sequential_rate
 
@@ -39,7 +39,7 @@ class Found:
     @property
     def valid(self) -> int:
         """How many count as tried."""
-        return self.episodes - self.outcomes["error"] - self.outcomes["invalid"]
+        return self.episodes - self.errors - self.invalid
 
     @property
     def tests(self) -> int:
@@ -55,6 +55,11 @@ class Found:
     def unfair(self) -> int:
         """How many left the ego no chance."""
         return self.outcomes[UNFAIR]
+
+    @property
+    def invalid(self) -> int:
+        """In how many a tester broke the rules of the world."""
+        return self.outcomes[INVALID]
 
     @property
     def errors(self) -> int:
@@ -80,7 +85,7 @@ class Tally:
 
     Attributes:
         agents: what each agent found, in the order in which they first appear.
-        first: the first row of each kind: "failure", "test", "error".
+        first: the first row of each kind: "failure", "test", "invalid", "error".
         rows: how many rows there were.
     """
 
@@ -102,8 +107,8 @@ class Tally:
             self.first.setdefault("test", row)
         if is_failure(row):
             self.first.setdefault("failure", row)
-        if row["outcome"] == "error":
-            self.first.setdefault("error", row)
+        if row["outcome"] in ("error", INVALID):
+            self.first.setdefault(row["outcome"], row)
 
     @property
     def all(self) -> Found:

@@ -96,12 +96,12 @@ class Theatre:
 def measured(episode: Episode) -> Row:
     """The columns of a row that a finished episode fills."""
     judgement, contacts = episode.judgement, episode.contacts
-    if episode.breach:  # what the assertions said is in ``verdicts``
+    if episode.invalid and episode.breach:  # what the assertions said is in ``verdicts``
         judgement = Judgement("", INVALID, episode.breach.tester)
     with_ego = {pair for pair in episode.sumo_collisions if "ego" in pair}
     return {
         "outcome": judgement.verdict,
-        "invalid": str(episode.breach or ""),
+        "breach": str(episode.breach or ""),
         "blame": episode.blame,
         "assertion": judgement.assertion if judgement.triggered else "",
         "verdicts": verdicts_cell(episode.verdicts),

@@ -1,6 +1,8 @@
 """Whether the testers keep to the rules of the world: a test that breaks them proves nothing.
 
-What a body of a tester must not do until the verdict (docs/fairness.md says why):
+An episode is invalid if the body that the verdict names broke a rule before it, or any body at the
+start. Where nothing was tested nothing can be invalid: such an episode stays in the rates, or agents
+would be rewarded for wasting it. What a body must not do before the verdict (docs/fairness.md):
 
 * start in another body;
 * get into another body by its own movement, deeper than people and vehicles can: a body that
@@ -18,6 +20,7 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 from cavsumo.agents.walking import turn_limit
+from cavsumo.assertions.base import NOT_TRIGGERED, Judgement
 from cavsumo.bodies import WALKING, Kind
 from cavsumo.contacts import STANDING_MPS, Pair, depth
 from cavsumo.kinematics import wrap
@@ -28,6 +31,7 @@ from cavsumo.starts import NEAR_M
 # How deep one body may get into another [m], by how many of the two are pedestrians of the testers:
 # their box, 0.66 m by 0.88 m, is larger than a person, who brushes past others.
 DEEP_M = {2: 0.3, 1: 0.15, 0: 0.1}
+STARTS_IN = "starts in"
 STRAY_M = NEAR_M  # who starts on a pavement so far from the road may cross the verge between them
 OFF_ROAD_M = 1.0
 ROUNDING = 1e-6  # m, m/s, rad
@@ -48,11 +52,11 @@ class Umpire:
     """Follows one episode.
 
     Attributes:
-        breach: the first one, None as long as the episode is valid.
+        breaches: the first one of each tester's body, in the order in which they came.
     """
 
     def __init__(self, scene: Scene) -> None:
-        self.breach: Breach | None = None
+        self.breaches: dict[str, Breach] = {}
         self._scene = scene
         self._index = {body.id: i for i, body in enumerate(scene.bodies)}
         self._testers: tuple[BodyState, ...] = ()
@@ -61,9 +65,7 @@ class Umpire:
         self._known = [(math.inf, math.inf, 0.0)] * len(scene.bodies)
 
     def observe(self, snapshot: Snapshot, pairs: Sequence[Pair]) -> None:
-        """Take in a snapshot and the pairs that touch in it; harmless after a breach."""
-        if self.breach is not None:
-            return
+        """Take in a snapshot and the pairs that touch in it."""
         if snapshot.step == 0:
             self._look_at_starts(snapshot, pairs)
         elif pairs or self._depths:
@@ -73,8 +75,23 @@ class Umpire:
             self._testers = snapshot.testers
 
     def _report(self, snapshot: Snapshot, tester: str, what: str) -> None:
-        """The first breach stands."""
-        self.breach = self.breach or Breach(snapshot.time, tester, what)
+        """The first breach of each body stands."""
+        self.breaches.setdefault(tester, Breach(snapshot.time, tester, what))
+
+    @property
+    def first(self) -> Breach | None:
+        """The first breach of all."""
+        return next(iter(self.breaches.values()), None)
+
+    def spoils(self, judgement: Judgement) -> Breach | None:
+        """The breach that makes an episode with this judgement invalid."""
+        first = self.first
+        if first is None or first.what.startswith(STARTS_IN):
+            return first
+        if judgement.verdict == NOT_TRIGGERED:
+            return None
+        # A verdict that names nobody, or somebody of the background, rests on all of them.
+        return self.breaches.get(judgement.tester) if judgement.tester in self._index else first
 
     def _look_at_starts(self, snapshot: Snapshot, pairs: Sequence[Pair]) -> None:
         """Whether a tester starts in another body; touching the ego is enough."""
@@ -82,7 +99,7 @@ class Umpire:
             tester, other = (a, b) if a.id in self._index else (b, a)
             with_ego = other is snapshot.ego
             if tester.id in self._index and (with_ego or _depth(tester, other) > _allowed(a, b)):
-                self._report(snapshot, tester.id, f"starts in {other.id}")
+                self._report(snapshot, tester.id, f"{STARTS_IN} {other.id}")
 
     def _look_at_pairs(self, snapshot: Snapshot, pairs: Sequence[Pair]) -> None:
         """Add up how deep each tester gets into others by its own movement."""

@@ -97,15 +97,16 @@ class Stage:
         end: float = 60.0,
         **params: bool | float,
     ) -> tuple[Judgement, Episode]:
-        """One episode with one assertion: what that says, and what happened."""
+        """One episode: what the assertions, named with blanks between, say, and what happened."""
+        names = tuple(name.split())
         site = Placed(
             **{f.name: getattr(self.site, f.name) for f in dataclasses.fields(Site)},
             places=tuple(places),
         )
-        settings = {"testers": len(places), "assertions": (name,), "kind": kind, "end": end}
+        settings = {"testers": len(places), "assertions": names, "kind": kind, "end": end}
         scenario = self.plan.scenario.model_copy(update=settings)
         stage = set_stage(scenario, site, Scripted(ego, start, decel))
-        stage = dataclasses.replace(stage, assertions=make_assertions((name,), dict(params)))
+        stage = dataclasses.replace(stage, assertions=make_assertions(names, dict(params)))
         agents = [Puppet(testers) for _ in stage.teams]
         try:
             episode = play(stage, agents, 1)

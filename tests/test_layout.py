@@ -27,12 +27,12 @@ ORDER = """
     agents.manoeuvres agents.behaviours agents.programmed agents.election agents.qlearning agents
     observations policies agents.policy
     ego_observations
-    contacts conduct validity
+    contacts conduct
     assertions.base assertions.room assertions.collision assertions.reaction_zone
     assertions.margin assertions.relations assertions.stopping_distance assertions.two_second_gap
     assertions.speed_limit assertions.leaving_the_road assertions.red_light assertions.give_way
     assertions.reasons assertions.standing assertions.hard_braking assertions.rss
-    assertions.criticality assertions blame
+    assertions.criticality assertions validity blame
     egos.base egos.constant egos.sumo egos.time_gap egos.effectors egos.controller
     egos.protocol egos.link egos.child egos.wire egos.external egos.specs egos
     options scenario outcomes rewards ego_rewards sumo_types demand simulations world

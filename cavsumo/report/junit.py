@@ -59,6 +59,9 @@ def _properties(parent: ET.Element, agent: str, found: Rates) -> None:
         if share.total:
             text += f", {percent(share.value)}, 95 % interval by {spans}"
         ET.SubElement(parent, "property", name=_legal(f"{agent}.{what}"), value=text)
+    if found.invalid:
+        text = f"{found.invalid} of {found.episodes} episodes"
+        ET.SubElement(parent, "property", name=_legal(f"{agent}.invalid"), value=text)
 
 
 def _case(batch: Batch, agent: str, assertion: str, rows: pandas.DataFrame) -> ET.Element:
