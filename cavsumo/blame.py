@@ -12,6 +12,8 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
+import shapely
+
 from cavsumo.assertions.base import Judgement
 from cavsumo.assertions.red_light import RED
 from cavsumo.assertions.relations import Relation, front_along, relation
@@ -160,8 +162,37 @@ def stepped_out(case: Case) -> float | None:
         if walks and not walked:
             step = i
         walked = walks
-    if step is None or not walked:
+    return None if step is None or not walked else _too_near(case, step)
+
+
+def stepped_in(case: Case) -> float | None:
+    """Somebody on foot came into the ego's way within its stopping distance, from wherever.
+
+    As RSS has it of all who make the lateral distance unsafe last (definition 8): whoever already
+    walks on the carriageway still has to let pass who cannot stop. Not so on marked crossings with
+    lights or priority, where the ego may have had to wait.
+    """
+    if case.body is None or is_vehicle(case.tester[0]):
         return None
+    entered = _entered(case)
+    if entered is None:
+        return None
+    body = case.tester[entered]
+    crossings = [c.surface for c in case.scene.crossings if c.signalled or c.priority]
+    if any(shapely.contains_xy(surface, body.x, body.y) for surface in crossings):
+        return None
+    return _too_near(case, entered)
+
+
+def _entered(case: Case) -> int | None:
+    """In which snapshot the body came into the ego's way, for the last time."""
+    steps = enumerate(pairwise(case.relations), 1)
+    entered = [i for i, (before, after) in steps if after.in_way and not before.in_way]
+    return entered[-1] if entered else None
+
+
+def _too_near(case: Case, step: int) -> float | None:
+    """The time of a snapshot in which the body is within the ego's stopping distance (rule 126)."""
     v, ahead = case.snapshots[step].ego.v, case.relations[step].ahead
     near = 0.0 < ahead < THINKING_S * v + v * v / (2.0 * DECEL)
     return case.snapshots[step].time if near else None
@@ -178,10 +209,7 @@ def cut_in(case: Case) -> float | None:
     approach = case.scene.starts[case.body].approach
     if approach is None or not (approach.yields or approach.type == "adjacent"):
         return None
-    entered: int | None = None
-    for i, (before, after) in enumerate(pairwise(case.relations), 1):
-        if after.in_way and not before.in_way:
-            entered = i
+    entered = _entered(case)
     if entered is None:
         return None
     there, snapshot = case.relations[entered], case.snapshots[entered]
@@ -194,5 +222,6 @@ RULES: Mapping[str, Callable[[Case], float | None]] = {
     "ego:speed": speeded,
     "ego:rss-response": answered_improperly,
     "tester:stepped-out": stepped_out,
+    "tester:stepped-in": stepped_in,
     "tester:cut-in": cut_in,
 }

@@ -1,8 +1,8 @@
 """Whether the testers keep to the rules of the world: a test that breaks them proves nothing.
 
 An episode is invalid if the body that the verdict names broke a rule before it, or any body at the
-start. Where nothing was tested nothing can be invalid: such an episode stays in the rates, or agents
-would be rewarded for wasting it. What a body must not do before the verdict (docs/fairness.md):
+start. Where nothing was tested nothing can be invalid: such an episode stays in the rates, or
+agents would be rewarded for wasting it. What a body must not do before the verdict:
 
 * start in another body;
 * get into another body by its own movement, deeper than people and vehicles can: a body that
