@@ -15,6 +15,7 @@ from cavsumo.agents.base import Agent
 from cavsumo.assertions.base import Assertion, Judgement, weightiest
 from cavsumo.bodies import Action, Kind
 from cavsumo.contacts import ContactMonitor
+from cavsumo.criticality import Course
 from cavsumo.egos.base import Drive, Ego
 from cavsumo.errors import AgentError
 from cavsumo.kinematics import step_floats
@@ -40,6 +41,7 @@ class Episode:
     time: float = 0.0
     max_decel: float = 0.0
     contacts: ContactMonitor = field(default_factory=ContactMonitor)
+    course: Course = field(default_factory=Course)
     cost: float = 0.0
     reward: float = 0.0
     sumo_collisions: frozenset[tuple[str, str]] = frozenset()
@@ -230,6 +232,7 @@ def _moved(
 def _observe(stage: Stage, episode: Episode, snapshot: Snapshot, record: bool) -> None:
     """Show a snapshot to the monitors and the assertions."""
     contacts = episode.contacts.observe(snapshot)
+    episode.course.observe(snapshot, contacts)
     for assertion in stage.assertions:
         assertion.observe(snapshot, contacts)
     if record:

@@ -87,6 +87,7 @@ class Theatre:
 def _row(plan: BatchPlan, job: Job, episode: Episode) -> Row:
     """The row of a finished episode."""
     judgement, contacts = episode.judgement, episode.contacts
+    ttc, drac, pet = episode.course.extremes()
     with_ego = {pair for pair in episode.sumo_collisions if "ego" in pair}
     return head(plan, job) | {
         "outcome": judgement.verdict,
@@ -99,6 +100,9 @@ def _row(plan: BatchPlan, job: Job, episode: Episode) -> Row:
         "time_s": episode.time,
         "steps": episode.steps,
         "min_gap_m": contacts.min_gap,
+        "min_ttc_s": ttc,
+        "max_drac_mps2": drac,
+        "pet_s": pet,
         "ego_speed_mps": judgement.ego_speed,
         "impact_speed_mps": judgement.impact_speed,
         "max_decel_mps2": episode.max_decel,

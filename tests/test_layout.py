@@ -25,7 +25,7 @@ ORDER = """
     osm handedness netconvert facts inspection layers picture
     agents.base agents.walking agents.driving agents.triggers agents.random agents.features
     agents.manoeuvres agents.behaviours agents.programmed agents.election agents.qlearning agents
-    contacts
+    contacts criticality
     assertions.base assertions.room assertions.collision assertions.reaction_zone
     assertions.margin assertions.relations assertions.stopping_distance assertions.two_second_gap
     assertions.speed_limit assertions.leaving_the_road assertions.red_light assertions.give_way
