@@ -79,7 +79,8 @@ def converging(kept: Sequence[Snapshot]) -> list[Pair]:
             dx, dy, reach = there_x - x, there_y - y, own + other.kind.reach
             passes, nearing = dx * wy - dy * wx, dx * wx + dy * wy
             room = reach * reach * square - passes * passes
-            if nearing > 0.0 and room >= 0.0:
+            # Centres that part already may have corners still to meet, while the circles overlap.
+            if room >= 0.0 and square > 0.0 and nearing >= -sqrt(room):
                 least = (nearing - sqrt(room)) / square
                 if least <= HORIZON_S:
                     pairs.append((max(0.0, least), wx * ahead + wy * left, ego, tester))

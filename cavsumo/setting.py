@@ -23,7 +23,7 @@ from cavsumo.egos import make_ego
 from cavsumo.egos.base import Ego
 from cavsumo.egos.specs import ego_files
 from cavsumo.errors import InputError
-from cavsumo.jobs import check_agents, learners, make_agents
+from cavsumo.jobs import check_agents, learners, make_agents, policy_files
 from cavsumo.options import OPTIONS
 from cavsumo.scenario import BatchPlan
 from cavsumo.signals import Pace
@@ -66,8 +66,11 @@ class Setting:
             raise InputError(f"{name} is {here} in the process that simulates, expected {there}")
 
 
-def prepare(plan: BatchPlan) -> Setting:
-    """Check every name and parameter of a plan and derive its site; raises InputError."""
+def prepare(plan: BatchPlan, ego: Ego | None = None) -> Setting:
+    """Check every name and parameter of a plan and derive its site; raises InputError.
+
+    ``ego`` drives instead of the one that the plan names.
+    """
     scenario = plan.scenario
     check_agents(plan)
     make_assertions(scenario.assertions, scenario.assertion_params)
@@ -79,7 +82,7 @@ def prepare(plan: BatchPlan) -> Setting:
             f"{what}: {' and '.join(sorted(learners(plan)))} learns from episode to episode, in "
             "sequence; learn=false plays what was learned"
         )
-    ego = make_ego(scenario.ego, scenario.ego_params)
+    ego = ego or make_ego(scenario.ego, scenario.ego_params)
     if scenario.ego_sensor and type(ego).act is Ego.act:
         raise InputError(
             f"ego_sensor: ego {scenario.ego} is driven by SUMO, which sees everybody; a sensor "
@@ -128,17 +131,17 @@ def _check_kind(plan: BatchPlan, kind: Kind) -> None:
         if plan.scenario.approaches:
             raise InputError(f"kind {kind.name!r}: only vehicles have approaches; name a --kind")
         return
-    for name in plan.agents:
-        if not all(agent.drives for agent in make_agents(plan, name)):
+    for label in plan.cast:
+        if not all(agent.drives for agent in make_agents(plan, label)):
             raise InputError(
-                f"kind {kind.name!r}: agent {name} can only walk; choose another agent or kind "
+                f"kind {kind.name!r}: agent {label} can only walk; choose another agent or kind "
                 f"{' or '.join(WALKING)}"
             )
 
 
 def _types(plan: BatchPlan) -> tuple[str, ...]:
     """The types of approach on which all agents can do the one manoeuvre asked of them."""
-    agents = [agent for name in plan.agents for agent in make_agents(plan, name)]
+    agents = [agent for label in plan.cast for agent in make_agents(plan, label)]
     names = {getattr(agent, "manoeuvre", "auto") for agent in agents}
     return types_for(names.pop()) if len(names) == 1 else ()
 
@@ -147,10 +150,11 @@ def checksums(plan: BatchPlan) -> dict[str, str]:
     """The SHA-256 of every file that a plan names, its ego's among them."""
     scenario = plan.scenario
     files = [scenario.net, *([scenario.routes] if scenario.routes else []), *scenario.additional]
-    return {str(file): _sha256(file) for file in (*files, *ego_files(scenario.ego))}
+    files += policy_files(plan)
+    return {str(file): checksum(file) for file in (*files, *ego_files(scenario.ego))}
 
 
-def _sha256(file: Path) -> str:
+def checksum(file: Path) -> str:
     """The SHA-256 of a file, which may be large."""
     try:
         with file.open("rb") as stream:
@@ -174,13 +178,13 @@ def manifest(setting: Setting) -> dict[str, Any]:
         "plan": setting.plan.model_dump(mode="json"),
         "ego_route": list(setting.site.route.edges),
         "junction": setting.site.route.junction,
-        "sha256": dict(setting.checksums) | _traffic_checksum(setting.site),
+        "sha256": dict(setting.checksums) | traffic_checksum(setting.site),
         "versions": dict(setting.versions),
         "sumo_options": dict(OPTIONS),
     }
 
 
-def _traffic_checksum(site: Site) -> dict[str, str]:
+def traffic_checksum(site: Site) -> dict[str, str]:
     """The SHA-256 of the background traffic that was drawn, if any."""
     if site.demand is None:
         return {}

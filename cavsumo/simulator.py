@@ -112,8 +112,18 @@ class Performance:
         self.over = _over(stage, successor)
         return rewards
 
+    @property
+    def contacts(self) -> ContactMonitor:
+        """Who touched whom so far."""
+        return self._episode.contacts
+
+    @property
+    def judgement(self) -> Judgement:
+        """The most serious of what the assertions say so far."""
+        return weightiest(self._stage.assertions)
+
     def finished(self) -> Episode:
-        """What happened."""
+        """What happened, or what happened so far."""
         return _finished(self._stage, self._episode, self.snapshot, self._ledger)
 
     def _show(self, snapshot: Snapshot) -> None:

@@ -10,10 +10,11 @@ import pytest
 from cavsumo.assertions import ASSERTIONS, Judgement, make_assertions
 from cavsumo.assertions.base import HELD, NOT_TRIGGERED, UNFAIR, VIOLATED, weightiest
 from cavsumo.cli import main
+from cavsumo.config import read_config
 from cavsumo.errors import InputError, UnknownName
 from cavsumo.outcomes import verdicts_cell, verdicts_of
 from cavsumo.results import read_rows
-from cavsumo.scenario import plan_from, read_config
+from cavsumo.scenario import plan_from
 from cavsumo.tally import Tally
 
 NAMES = ("reaction-zone", "stopping-distance", "speed-limit")
