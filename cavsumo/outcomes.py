@@ -41,9 +41,11 @@ COLUMNS: Mapping[str, str] = {
     "time_s": "length of the episode",
     "steps": "length of the episode in timesteps",
     "min_gap_m": "smallest gap between the ego and a tester",
-    "min_ttc_s": "smallest time to collision (not measured in this version)",
-    "max_drac_mps2": "largest deceleration to avoid a crash (not measured in this version)",
-    "pet_s": "post-encroachment time (not measured in this version)",
+    "min_ttc_s": "smallest time to collision of the moving ego and a tester at constant "
+    "velocities, before the first contact; empty above 10 s",
+    "max_drac_mps2": "largest deceleration by which the ego just avoids that collision; 0 for none",
+    "pet_s": "post-encroachment time: how long after the one the other, ego or tester, came to a "
+    "place of its way; 0 with a contact, empty above 10 s",
     "ego_speed_mps": "speed of the ego at the violation, else at the trigger",
     "impact_speed_mps": "closing speed along the ego's heading at contact",
     "max_decel_mps2": "hardest braking of the ego",

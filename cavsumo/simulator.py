@@ -17,6 +17,7 @@ from cavsumo.blame import blamed
 from cavsumo.bodies import Action, Kind
 from cavsumo.conduct import Conduct
 from cavsumo.contacts import ContactMonitor
+from cavsumo.criticality import Course
 from cavsumo.egos.base import Drive, Ego
 from cavsumo.errors import AgentError
 from cavsumo.kinematics import step_floats
@@ -48,6 +49,7 @@ class Episode:
     invalid: bool = False
     blame: str = ""
     rms_acceleration: float = 0.0
+    course: Course = field(default_factory=Course)
     cost: float = 0.0
     reward: float = 0.0
     sumo_collisions: frozenset[tuple[str, str]] = frozenset()
@@ -161,6 +163,7 @@ class Performance:
         if not any(a.judgement.verdict == VIOLATED for a in assertions):
             self._umpire.observe(snapshot, episode.contacts.pairs)
         episode.conduct.observe(snapshot)
+        episode.course.observe(snapshot, contacts)
         for assertion in assertions:
             assertion.observe(snapshot, contacts)
         self._history.append(snapshot)

@@ -98,6 +98,7 @@ def measured(episode: Episode) -> Row:
     judgement, contacts = episode.judgement, episode.contacts
     if episode.invalid and episode.breach:  # what the assertions said is in ``verdicts``
         judgement = Judgement("", INVALID, episode.breach.tester)
+    ttc, drac, pet = episode.course.extremes()
     with_ego = {pair for pair in episode.sumo_collisions if "ego" in pair}
     return {
         "outcome": judgement.verdict,
@@ -112,6 +113,9 @@ def measured(episode: Episode) -> Row:
         "time_s": episode.time,
         "steps": episode.steps,
         "min_gap_m": contacts.min_gap,
+        "min_ttc_s": ttc,
+        "max_drac_mps2": drac,
+        "pet_s": pet,
         "ego_speed_mps": judgement.ego_speed,
         "impact_speed_mps": judgement.impact_speed,
         "max_decel_mps2": episode.max_decel,

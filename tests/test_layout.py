@@ -27,7 +27,7 @@ ORDER = """
     agents.manoeuvres agents.behaviours agents.programmed agents.election agents.qlearning agents
     observations policies agents.policy
     ego_observations
-    contacts conduct
+    contacts conduct criticality
     assertions.base assertions.room assertions.collision assertions.reaction_zone
     assertions.margin assertions.relations assertions.stopping_distance assertions.two_second_gap
     assertions.speed_limit assertions.leaving_the_road assertions.red_light assertions.give_way
@@ -35,16 +35,19 @@ ORDER = """
     assertions.criticality assertions validity blame
     egos.base egos.constant egos.sumo egos.time_gap egos.effectors egos.controller
     egos.protocol egos.link egos.child egos.wire egos.external egos.specs egos
-    options scenario outcomes rewards ego_rewards sumo_types demand simulations world
+    options labels scenario config study outcomes rewards ego_rewards
+    sumo_types demand simulations world
     jobs stage simulator setting traces theatre worker_process worker batch executors
     envs.spaces envs.puppets envs.settings envs.events envs.episodes envs.elsewhere_process
     envs.elsewhere envs.painting envs.base envs.tester envs.ego envs.parallel envs.discrete envs
-    statistics tally stopping results recorder learning progress session
+    statistics tally stopping results recorder learning progress session checked
     summary interrupts replays listings fcd gui
-    player.packing player.curves player.scenery player.facts player.page player
+    pages.shell pages player.packing player.curves player.scenery player.facts player.page player
     report report.load report.grouping report.rates report.pairs report.compare report.survival
     report.effort report.events report.distinct report.analysis report.tables report.figures
     report.formats report.junit
+    report.page.scenes report.page.words report.page.plots report.page.places report.page.links
+    report.page.document report.page
     testing.scripts testing.ego_checks testing.agent_checks testing.assertion_checks testing
     commands commands.run commands.replay commands.merge commands.report commands.inspect
     commands.import_osm commands.check_ego

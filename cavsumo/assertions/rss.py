@@ -46,9 +46,9 @@ class RssAssertion(MarginAssertion):
     (``b_min_correct`` before oncoming traffic) until the distance is safe or it stands. Lateral
     (somebody cuts or steps in): for ``rho`` it gains speed sideways towards them by at most
     ``a_lat_max_accel``, then brakes sideways by at least ``b_lat_min``; who keeps to its lane has
-    nothing to do. Violated by less. Robustness: smallest difference of the accelerations
-    [m/s2]. Bodies: testers and background. Defaults: those of CARLA's RSS sensor (RssCheck.cpp),
-    for all bodies.
+    nothing to do.
+    Violated by less. Robustness: smallest difference of the accelerations [m/s2]. Bodies: testers
+    and background. Defaults: those of CARLA's RSS sensor (RssCheck.cpp), for all bodies.
     """
 
     name: ClassVar[str] = "rss"

@@ -57,10 +57,14 @@ def drac_boxes(first: ArrayLike, v1: ArrayLike, second: ArrayLike, v2: ArrayLike
     it to stand at the place s ahead where they would touch. 0 where they do not close in, infinite
     where they touch.
     """
-    heading = np.asarray(first, float)[..., 2]
+    return drac_at(first, v1, v2, ttc_boxes(first, v1, second, v2))
+
+
+def drac_at(first: ArrayLike, v1: ArrayLike, v2: ArrayLike, ttc: ArrayLike) -> Numbers:
+    """``drac_boxes`` where the time to collision is known [m/s2]."""
+    heading, time = np.asarray(first, float)[..., 2], np.asarray(ttc, float)
     ahead = np.stack([np.cos(heading), np.sin(heading)], axis=-1)
     closing = _dot(np.asarray(v1, float) - np.asarray(v2, float), ahead)
-    time = ttc_boxes(first, v1, second, v2)
     with np.errstate(divide="ignore", invalid="ignore"):
         needed = closing / (2.0 * time)
     needed = np.where(closing > 0.0, needed, 0.0)
