@@ -176,7 +176,7 @@ class Roads:
     ) -> None:
         self.carriageway = carriageway
         self.lanes = list(lanes)
-        self.pavements = shapely.multilinestrings(list(pavements))
+        self.pavements = shapely.MultiLineString(list(pavements))
         self._index = shapely.STRtree(self.lanes)
         self._boundary = carriageway.boundary
         shapely.prepare(self.carriageway)
