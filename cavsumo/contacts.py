@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-from cavsumo.geometry import gap, overlap
+from cavsumo.geometry import Box, gap, overlap
 from cavsumo.snapshot import BodyState, RawState, Snapshot
 
 # Below this speed the ego stands: whoever touches it then walked into it [m/s].
@@ -38,11 +38,13 @@ class ContactMonitor:
 
     Attributes:
         ego_pairs, tester_pairs: the pairs that touched so far, with the ego and without it.
+        pairs: those that touch now.
     """
 
     def __init__(self) -> None:
         self.ego_pairs: set[tuple[str, str]] = set()
         self.tester_pairs: set[tuple[str, str]] = set()
+        self.pairs: list[Pair] = []
         self._touching: set[tuple[str, str]] = set()
         self._touched_standing: set[tuple[str, str]] = set()
         # Where the smallest gap may have been: with its lower bound, those below any upper bound.
@@ -64,6 +66,7 @@ class ContactMonitor:
         """The contacts that begin in this snapshot; one that lasts is reported once."""
         pairs = self._meetings_with_ego(snapshot)
         pairs += self._meetings_of_testers(snapshot)
+        self.pairs = pairs
         if not pairs and not self._touching:
             return []
         standing = snapshot.ego.v <= STANDING_MPS
@@ -125,6 +128,26 @@ class ContactMonitor:
         self._close.append((lower, ego, tester))
         if len(self._close) > KEPT:
             self._close = [c for c in self._close if c[0] <= self._upper]
+
+
+def depth(a: Box, b: Box) -> float:
+    """How far the boxes must be moved to part [m]; 0 if they are apart (separating axes)."""
+    dx, dy, turn = b.x - a.x, b.y - a.y, b.heading - a.heading
+    c, s = abs(math.cos(turn)), abs(math.sin(turn))
+    along = 0.5 * (a.length + b.length * c + b.width * s)
+    across = 0.5 * (a.width + b.length * s + b.width * c)
+    other_along = 0.5 * (b.length + a.length * c + a.width * s)
+    other_across = 0.5 * (b.width + a.length * s + a.width * c)
+    ca, sa, cb, sb = (f(o) for o in (a.heading, b.heading) for f in (math.cos, math.sin))
+    return max(
+        0.0,
+        min(
+            along - abs(dx * ca + dy * sa),
+            across - abs(dy * ca - dx * sa),
+            other_along - abs(dx * cb + dy * sb),
+            other_across - abs(dy * cb - dx * sb),
+        ),
+    )
 
 
 def _meetings_among(testers: tuple[BodyState, ...]) -> list[Pair]:

@@ -104,14 +104,15 @@ class Network:
         return [lanes[i] for i in sorted(tree.query(line, "dwithin", reach_m).tolist())]
 
     def roads(self) -> Roads:
-        """The carriageways, junctions included, and the axes of the driving lanes."""
+        """The carriageways, junctions included, and the axes of driving lanes and pavements."""
         driving = [lane for edge in self.edges for lane in driving_lanes(edge)]
         inside = [lane for edge in self.inside("internal") for lane in driving_lanes(edge)]
         surface = shapely.union_all(lane_areas(driving + inside))
         closed = surface.buffer(CLOSING_M, join_style="mitre").buffer(
             -CLOSING_M, join_style="mitre"
         )
-        return Roads(closed.simplify(0.01), [LineString(lane_shape(lane)) for lane in driving])
+        axes = [[LineString(lane_shape(p)) for p in ps] for ps in (driving, self.pavements())]
+        return Roads(closed.simplify(0.01), *axes)
 
 
 def read_network(file: FilePath, *, foes: bool = False) -> Network:

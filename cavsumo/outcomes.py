@@ -25,22 +25,34 @@ COLUMNS: Mapping[str, str] = {
     "embodiment": "how SUMO was shown the testers: vehicle or person",
     "sumo_width_m": "width that SUMO was shown of a tester pedestrian",
     "seed": "the episode's seed, derived from the batch's seed and the number of the episode",
-    "outcome": "violated, held, not_triggered, unfair or error",
-    "assertion": "the assertion first violated, else triggered",
+    "outcome": "violated, held, not_triggered, unfair, invalid or error",
+    "breach": "which tester broke which rule of the world before the verdict, and when: the "
+    "one that makes the episode invalid, else the first",
+    "blame": "which party broke which rule first when outcome is violated, as PARTY:rule; a hint, "
+    "not law (docs/fairness.md); empty if no rule tells",
+    "assertion": "the assertion first violated, else first triggered; one without a precondition "
+    "only if violated or alone",
+    "verdicts": "what every assertion said: NAME=verdict, with blanks between",
+    "robustness": "smallest margin of that assertion since its trigger, in its unit (docs/"
+    "assertions.md); negative if and only if violated",
     "tester": "the tester's body involved",
     "trigger_time_s": "when the precondition triggered",
     "violation_time_s": "when the assertion was violated",
     "time_s": "length of the episode",
     "steps": "length of the episode in timesteps",
     "min_gap_m": "smallest gap between the ego and a tester",
-    "min_ttc_s": "smallest time to collision (not measured in this version)",
-    "max_drac_mps2": "largest deceleration to avoid a crash (not measured in this version)",
-    "pet_s": "post-encroachment time (not measured in this version)",
+    "min_ttc_s": "smallest time to collision of the moving ego and a tester at constant "
+    "velocities, before the first contact; empty above 10 s",
+    "max_drac_mps2": "largest deceleration by which the ego just avoids that collision; 0 for none",
+    "pet_s": "post-encroachment time: how long after the one the other, ego or tester, came to a "
+    "place of its way; 0 with a contact, empty above 10 s",
     "ego_speed_mps": "speed of the ego at the violation, else at the trigger",
     "impact_speed_mps": "closing speed along the ego's heading at contact",
     "max_decel_mps2": "hardest braking of the ego",
     "avoidable": "whether the ego could still have avoided it (not judged in this version)",
     "cost": "time that the testers spent on the carriageway, together [s]",
+    "accel_rms_mps2": "root mean square of the testers' accelerations over all timesteps",
+    "turning_rad": "how far the testers turned, to either side, together",
     "reward": "the testers' return, undiscounted",
     "contacts": "bodies that touched the ego, standing or moving",
     "tester_contacts": "pairs of a tester and a body other than the ego that touched",
@@ -93,6 +105,17 @@ def row_line(row: Mapping[str, Any]) -> str:
     cells = [cell(row.get(column)) for column in COLUMNS]
     csv.writer(line, lineterminator="\n").writerow(cells)
     return line.getvalue()
+
+
+def verdicts_cell(verdicts: Mapping[str, str]) -> str:
+    """What every assertion said, as it stands in the CSV."""
+    return " ".join(f"{name}={verdict}" for name, verdict in verdicts.items())
+
+
+def verdicts_of(row: Mapping[str, Any]) -> dict[str, str]:
+    """What every assertion said of an episode; nothing where that was not recorded."""
+    said = str(row.get("verdicts") or "").split()
+    return {name: verdict for name, _, verdict in (word.rpartition("=") for word in said)}
 
 
 def is_test(row: Mapping[str, Any]) -> bool:

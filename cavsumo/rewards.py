@@ -7,7 +7,7 @@ carriageway cost. Everything else, an unfair episode included, is worth nothing.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Container, Sequence
 
 from cavsumo.assertions.base import Judgement
 from cavsumo.scene import Scene
@@ -31,6 +31,7 @@ class Ledger:
         self.cost = self.total = 0.0
         self._dt, self._roads, self._teams = scene.dt, scene.roads, teams
         self._over = False
+        self._names = {body.id for body in scene.bodies}
         # Whether a body is on the carriageway, where that was looked up, and how far from there it
         # cannot change; asking the map is dear, so it is asked no earlier.
         self._on_road = [False] * len(scene.bodies)
@@ -38,8 +39,13 @@ class Ledger:
         self._seen: tuple[BodyState, ...] = ()
         self._waiting = [-self._dt * TIME_COST] * len(teams)  # with nobody on the road
 
-    def rewards(self, successor: Snapshot, judgements: Sequence[Judgement]) -> Feedback | None:
-        """Each agent's reward for a timestep and whether the game ends; None once it is over."""
+    def rewards(
+        self, successor: Snapshot, judgements: Sequence[Judgement], cheats: Container[str] = ()
+    ) -> Feedback | None:
+        """Each agent's reward for a timestep and whether the game ends; None once it is over.
+
+        ``cheats``: bodies that broke the rules of the world, who earn nothing by the goal.
+        """
         testers, on_road = successor.testers, self._on_road
         if testers is not self._seen:
             self._seen = testers
@@ -57,10 +63,12 @@ class Ledger:
             for a, team in enumerate(self._teams):
                 rewards[a] -= self._dt * ROAD_COST * sum([on_road[i] for i in team])
         for judgement in judgements:
-            if judgement.tester:  # somebody reached the goal, or spoilt it
+            if judgement.tester in self._names:  # somebody reached the goal, or spoilt it
                 self._over = True
                 for a, team in enumerate(self._teams):
-                    if judgement.triggered and judgement.tester in [testers[i].id for i in team]:
+                    names = [testers[i].id for i in team]
+                    fair = judgement.triggered and judgement.tester not in cheats
+                    if fair and judgement.tester in names:
                         rewards[a] += GOAL
         self.total += sum(rewards)
         return rewards, self._over

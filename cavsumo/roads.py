@@ -8,7 +8,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import shapely
 from shapely.geometry import LineString, Point
@@ -62,6 +62,38 @@ class Light(NamedTuple):
     id: str
     link: int
     along: float
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class MarkedCrossing:
+    """A marked pedestrian crossing on the ego's way.
+
+    Attributes:
+        id: of the crossing in the network.
+        begin, end: where the ego's path enters and leaves its surface [m].
+        surface: the crossing.
+        signalled: whether traffic lights control it.
+        priority: whether pedestrians on it go before vehicles, as on a zebra crossing.
+    """
+
+    id: str
+    begin: float
+    end: float
+    surface: shapely.Geometry
+    signalled: bool
+    priority: bool
+
+
+class Limit(NamedTuple):
+    """A speed limit on the ego's way, until the next one.
+
+    Attributes:
+        along: arc length on the ego's path from which it holds [m].
+        speed: [m/s].
+    """
+
+    along: float
+    speed: float
 
 
 # How a vehicle's way lies to the ego's: across it, into its lane, on its lane ahead of it, in a
@@ -133,18 +165,26 @@ class Roads:
     Args:
         carriageway: the union of all lanes for vehicles, junctions included.
         lanes: axes of the lanes for vehicles outside junctions; they give a road its direction.
+        pavements: axes of the pavements and footpaths.
     """
 
-    def __init__(self, carriageway: shapely.Geometry, lanes: Sequence[LineString]) -> None:
+    def __init__(
+        self,
+        carriageway: shapely.Geometry,
+        lanes: Sequence[LineString],
+        pavements: Sequence[LineString] = (),
+    ) -> None:
         self.carriageway = carriageway
         self.lanes = list(lanes)
+        self.pavements = shapely.MultiLineString(list(pavements))
         self._index = shapely.STRtree(self.lanes)
         self._boundary = carriageway.boundary
         shapely.prepare(self.carriageway)
         shapely.prepare(self._boundary)
+        shapely.prepare(self.pavements)
 
-    def __reduce__(self) -> tuple[type[Roads], tuple[shapely.Geometry, list[LineString]]]:
-        return Roads, (self.carriageway, self.lanes)
+    def __reduce__(self) -> tuple[type[Roads], tuple[Any, ...]]:
+        return Roads, (self.carriageway, self.lanes, list(self.pavements.geoms))
 
     def contains(self, x: float, y: float) -> bool:
         """Whether a point lies on the carriageway."""
@@ -153,6 +193,17 @@ class Roads:
     def edge_distance(self, x: float, y: float) -> float:
         """Distance to the nearest edge of a carriageway [m]."""
         return float(shapely.distance(self._boundary, Point(x, y)))
+
+    def driving_distance(self, x: float, y: float) -> float:
+        """Distance to the carriageway [m], 0 on it."""
+        return 0.0 if self.contains(x, y) else self.edge_distance(x, y)
+
+    def walking_distance(self, x: float, y: float) -> float:
+        """Distance to the nearest carriageway or axis of a pavement [m], 0 on a carriageway."""
+        road = self.driving_distance(x, y)
+        if self.pavements.is_empty:
+            return road
+        return min(road, float(shapely.distance(self.pavements, Point(x, y))))
 
     def crossing(self, x: float, y: float) -> Crossing | None:
         """The way straight across the nearest road from a point, or None where there is none."""

@@ -102,6 +102,12 @@ class Scenario(BaseModel):
         """One number for cars and pedestrians or two, as numbers or as text with a comma."""
         return None if value is None else densities(value)
 
+    @field_validator("assertion_params", mode="before")
+    @classmethod
+    def _of_one(cls, value: Any) -> Any:
+        """``NAME.KEY`` for one of several assertions, in TOML also as a table of its own."""
+        return qualified(value)
+
     @field_validator("ego_sensor", "tester_sensor")
     @classmethod
     def _full_observability(cls, value: Sensor | None) -> Sensor | None:
@@ -149,6 +155,12 @@ class BatchPlan(BaseModel):
         "tests", description="the rate meant: tests among episodes, or failures among tests"
     )
     budget_s: Finite | None = Field(None, gt=0, description="stop after so much real time [s]")
+
+    @field_validator("params", mode="before")
+    @classmethod
+    def _of_one(cls, value: Any) -> Any:
+        """``NAME.KEY`` for one of several agents, in TOML also as a table of its own."""
+        return qualified(value)
 
     @field_validator("until_half_width", mode="before")
     @classmethod
@@ -202,6 +214,17 @@ class BatchPlan(BaseModel):
         return mine | {
             k.removeprefix(prefix): v for k, v in self.params.items() if k.startswith(prefix)
         }
+
+
+def qualified(params: Any) -> Any:
+    """Parameters with those of inner tables under their full names, ``TABLE.KEY``."""
+    if not isinstance(params, Mapping):
+        return params
+    flat: dict[str, Any] = {}
+    for key, value in params.items():
+        inner = isinstance(value, Mapping)
+        flat |= {f"{key}.{k}": v for k, v in value.items()} if inner else {key: value}
+    return flat
 
 
 def half_width(text: str) -> tuple[float, bool]:

@@ -7,7 +7,7 @@ from typing import Any
 
 from cavsumo.bodies import Body
 from cavsumo.paths import Path, Projection
-from cavsumo.roads import Crossing, Light, Roads, Start
+from cavsumo.roads import Crossing, Light, Limit, MarkedCrossing, Roads, Start
 from cavsumo.snapshot import Snapshot
 
 
@@ -23,6 +23,8 @@ class Scene:
         starts: where each of them starts.
         roads: carriageways and the ways across them; None on an open plane.
         lights: the traffic lights on the ego's path, in the order in which it meets them.
+        crossings: the marked pedestrian crossings on the ego's path, likewise.
+        limits: the speed limits on the ego's path, likewise.
         seed: of the episode; whoever draws random numbers without a generator starts from it.
     """
 
@@ -34,6 +36,8 @@ class Scene:
     roads: Roads | None = None
     lights: tuple[Light, ...] = ()
     seed: int = 0
+    crossings: tuple[MarkedCrossing, ...] = ()
+    limits: tuple[Limit, ...] = ()
     _progress: list[Any] = field(default_factory=lambda: [None, None], repr=False)
     _glimpse: list[Any] = field(default_factory=lambda: [None, None], repr=False)
     _ways: dict[int, Crossing | None] = field(default_factory=dict, repr=False)

@@ -16,7 +16,7 @@ import numpy as np
 
 from cavsumo import __version__
 from cavsumo.agents.manoeuvres import types_for
-from cavsumo.assertions import ASSERTIONS
+from cavsumo.assertions import make_assertions
 from cavsumo.bodies import WALKING, Kind, kind_named
 from cavsumo.demand import BEYOND_S
 from cavsumo.egos import make_ego
@@ -73,8 +73,7 @@ def prepare(plan: BatchPlan, ego: Ego | None = None) -> Setting:
     """
     scenario = plan.scenario
     check_agents(plan)
-    for name in scenario.assertions:
-        ASSERTIONS.make(name, scenario.assertion_params)
+    make_assertions(scenario.assertions, scenario.assertion_params)
     kind = kind_named(scenario.kind)
     _check_kind(plan, kind)
     if learners(plan) and (plan.shard or plan.reset == "shared"):

@@ -6,15 +6,18 @@ The truth about the testers' bodies is integrated here by the kinematics; the wo
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
 
 from cavsumo.agents.base import Agent
-from cavsumo.assertions.base import SEVERITY, Assertion, Judgement
+from cavsumo.assertions.base import INVALID, VIOLATED, Assertion, Judgement, weightiest
+from cavsumo.blame import blamed
 from cavsumo.bodies import Action, Kind
+from cavsumo.conduct import Conduct
 from cavsumo.contacts import ContactMonitor
+from cavsumo.criticality import Course
 from cavsumo.egos.base import Drive, Ego
 from cavsumo.errors import AgentError
 from cavsumo.kinematics import step_floats
@@ -25,6 +28,7 @@ from cavsumo.scene import Scene
 from cavsumo.sensors import Senses
 from cavsumo.snapshot import BodyState, Snapshot
 from cavsumo.stage import Stage
+from cavsumo.validity import Breach, Umpire
 
 # An episode whose verdict is open at the horizon may run on for this long [s].
 OVERTIME_S = 15.0
@@ -35,16 +39,28 @@ class Episode:
     """What happened, while and after it happens."""
 
     judgement: Judgement
+    verdicts: Mapping[str, str] = field(default_factory=dict)
     steps: int = 0
     time: float = 0.0
     max_decel: float = 0.0
     contacts: ContactMonitor = field(default_factory=ContactMonitor)
+    conduct: Conduct = field(default_factory=Conduct)
+    breach: Breach | None = None
+    invalid: bool = False
+    blame: str = ""
+    rms_acceleration: float = 0.0
+    course: Course = field(default_factory=Course)
     cost: float = 0.0
     reward: float = 0.0
     sumo_collisions: frozenset[tuple[str, str]] = frozenset()
     teleports: int = 0
     emergency_stops: int = 0
     frames: list[Snapshot] = field(default_factory=list)
+
+    @property
+    def outcome(self) -> str:
+        """What came out: the verdict, unless a tester broke the rules of the world before it."""
+        return INVALID if self.invalid else self.judgement.verdict
 
 
 class Performance:
@@ -77,8 +93,10 @@ class Performance:
         self._show(self.snapshot)
         self._ledger = Ledger(self.scene, stage.teams)
         self._episode = Episode(Judgement(""))
+        self._umpire = Umpire(self.scene)
+        self._history: list[Snapshot] = []  # what the blame is found from
         self._learners = any(type(a).process_feedback is not Agent.process_feedback for a in agents)
-        _observe(stage, self._episode, self.snapshot, record)
+        self._observe(self.snapshot)
         self.over = _over(stage, self.snapshot)
 
     def step(self) -> Feedback | None:
@@ -100,8 +118,9 @@ class Performance:
         braking = (snapshot.ego.v - successor.ego.v) / scene.dt
         if braking > episode.max_decel:
             episode.max_decel = braking
-        _observe(stage, episode, successor, self._record)
-        rewards = self._ledger.rewards(successor, [a.judgement for a in stage.assertions])
+        self._observe(successor)
+        judgements = [a.judgement for a in stage.assertions]
+        rewards = self._ledger.rewards(successor, judgements, self._umpire.breaches)
         self._show(successor)
         if self._learners:
             _feed_back(agents, views, actions, rewards, self.agent_views)
@@ -117,11 +136,39 @@ class Performance:
     @property
     def judgement(self) -> Judgement:
         """The most serious of what the assertions say so far."""
-        return _worst(self._stage)
+        return weightiest(self._stage.assertions)
+
+    @property
+    def outcome(self) -> str:
+        """What came out so far."""
+        return INVALID if self._umpire.spoils(self.judgement) else self.judgement.verdict
 
     def finished(self) -> Episode:
         """What happened, or what happened so far."""
-        return _finished(self._stage, self._episode, self.snapshot, self._ledger)
+        episode = _finished(self._stage, self._episode, self.snapshot, self._ledger)
+        episode.rms_acceleration = episode.conduct.rms_acceleration(episode.steps, self.scene.dt)
+        spoilt = self._umpire.spoils(episode.judgement)
+        episode.invalid, episode.breach = spoilt is not None, spoilt or self._umpire.first
+        if episode.outcome == VIOLATED:
+            episode.blame = blamed(self.scene, self._history, episode.judgement)
+        return episode
+
+    def _observe(self, snapshot: Snapshot) -> None:
+        """Show a snapshot to the monitors and the assertions.
+
+        The testers are watched until an assertion is violated: what follows changes no verdict.
+        """
+        episode, assertions = self._episode, self._stage.assertions
+        contacts = episode.contacts.observe(snapshot)
+        if not any(a.judgement.verdict == VIOLATED for a in assertions):
+            self._umpire.observe(snapshot, episode.contacts.pairs)
+        episode.conduct.observe(snapshot)
+        episode.course.observe(snapshot, contacts)
+        for assertion in assertions:
+            assertion.observe(snapshot, contacts)
+        self._history.append(snapshot)
+        if self._record:
+            episode.frames.append(snapshot)
 
     def _show(self, snapshot: Snapshot) -> None:
         """Let everybody see a snapshot: all of it, unless there are sensors."""
@@ -156,9 +203,7 @@ def _reset(
     ego = stage.world.ego_body
     starts = stage.site.draw(kinds, ego.kind, stage.start_speed, placing)
     site = stage.site
-    scene = Scene(
-        stage.world.dt, ego, site.route.path, stage.bodies, starts, site.roads, site.lights, seed
-    )
+    scene = site.scene(stage.world.dt, ego, stage.bodies, starts, seed)
     watching: list[Ego | Agent | Assertion] = [stage.ego, *agents, *stage.assertions]
     # Vehicles keep their distance to whoever is ahead of them, so they see everybody.
     driving = any(start.approach for start in starts)
@@ -238,15 +283,6 @@ def _moved(
     return tuple(moved) if moved else testers
 
 
-def _observe(stage: Stage, episode: Episode, snapshot: Snapshot, record: bool) -> None:
-    """Show a snapshot to the monitors and the assertions."""
-    contacts = episode.contacts.observe(snapshot)
-    for assertion in stage.assertions:
-        assertion.observe(snapshot, contacts)
-    if record:
-        episode.frames.append(snapshot)
-
-
 def _feed_back(
     agents: Sequence[Agent],
     before: Sequence[Snapshot],
@@ -284,7 +320,8 @@ def _at_end(scene: Scene, snapshot: Snapshot) -> bool:
 
 def _finished(stage: Stage, episode: Episode, snapshot: Snapshot, ledger: Ledger) -> Episode:
     """The episode with its totals."""
-    episode.judgement = _worst(stage)
+    episode.judgement = weightiest(stage.assertions)
+    episode.verdicts = {a.name: a.judgement.verdict for a in stage.assertions}
     episode.steps, episode.time = snapshot.step, snapshot.time
     episode.cost, episode.reward = ledger.cost, ledger.total
     world = stage.world
@@ -292,9 +329,3 @@ def _finished(stage: Stage, episode: Episode, snapshot: Snapshot, ledger: Ledger
     episode.teleports, episode.emergency_stops = world.teleports, world.emergency_stops
     assert math.isfinite(episode.reward)
     return episode
-
-
-def _worst(stage: Stage) -> Judgement:
-    """The most serious judgement."""
-    judgements = [a.judgement for a in stage.assertions]
-    return min(judgements, key=lambda j: SEVERITY.index(j.verdict))

@@ -15,13 +15,15 @@ import numpy as np
 import shapely
 
 from cavsumo.approaches import approaches
-from cavsumo.bodies import PEDESTRIAN, WALKING, Kind
+from cavsumo.bodies import PEDESTRIAN, WALKING, Body, Kind
 from cavsumo.ego_routes import EgoRoute, derived_routes, given_route, turn_meant, turning_routes
 from cavsumo.errors import NetworkError
 from cavsumo.geometry import Box
 from cavsumo.kerbs import kerb_areas
 from cavsumo.network import Network, read_network
-from cavsumo.roads import Approach, Light, Roads, Start
+from cavsumo.roads import Approach, Light, Limit, MarkedCrossing, Roads, Start
+from cavsumo.route_rules import crossings_along, limits_along
+from cavsumo.scene import Scene
 from cavsumo.signals import LightStart, Pace, Signal, light_start, lights_along
 from cavsumo.starts import StartingArea, draw_starts, starting_areas
 from cavsumo.traffic import Volume, background
@@ -45,6 +47,8 @@ class Site:
         light: how the first traffic light on the ego's route begins an episode; None for as it is.
         approaches: the ways on which tester vehicles may meet the ego; none for testers on foot.
         lights: the traffic lights on the ego's route.
+        marked: the marked pedestrian crossings on the ego's route.
+        limits: the speed limits on the ego's route.
     """
 
     net: Path
@@ -56,6 +60,8 @@ class Site:
     light: LightStart | None = None
     approaches: tuple[Approach, ...] = ()
     lights: tuple[Light, ...] = ()
+    marked: tuple[MarkedCrossing, ...] = ()
+    limits: tuple[Limit, ...] = ()
 
     def draw(
         self, kinds: Sequence[Kind], ego: Kind, start_speed: float | None, rng: np.random.Generator
@@ -65,6 +71,23 @@ class Site:
             return draw_starts(self.areas, kinds, rng)
         box = Box(*self.route.path.at(0.0), ego.length, ego.width)
         return draw_vehicles(self.approaches, kinds, box, start_speed, rng)
+
+    def scene(
+        self, dt: float, ego: Body, bodies: Sequence[Body], starts: Sequence[Start], seed: int
+    ) -> Scene:
+        """What does not change during an episode here."""
+        return Scene(
+            dt=dt,
+            ego=ego,
+            ego_path=self.route.path,
+            bodies=tuple(bodies),
+            starts=tuple(starts),
+            roads=self.roads,
+            lights=self.lights,
+            seed=seed,
+            crossings=self.marked,
+            limits=self.limits,
+        )
 
 
 @dataclass(frozen=True)
@@ -140,6 +163,8 @@ def _derived(
         light_start(network, route, wishes.signal, wishes.pace),
         ways,
         lights_along(network, route),
+        crossings_along(network, route),
+        limits_along(network, route),
     )
 
 

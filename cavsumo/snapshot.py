@@ -50,7 +50,7 @@ class Snapshot(NamedTuple):
             ego, agent or assertion of the episode ``sees_background`` and nothing is recorded,
             those are left out who cannot touch the ego or a tester now (see ``background``).
         lights: what each of ``Scene.lights`` shows the ego, as SUMO's letter (G and g are green, y
-            is yellow, r is red); empty when nobody looks, as above.
+            is yellow, r is red).
         unseen: ids of the ego and of testers whom a tester agent does not see through its sensor
             (``sensors``): they are shown where it last saw them. None without such a sensor.
     """

@@ -10,6 +10,7 @@ from rich.console import Console
 from rich.measure import Measurement
 from rich.table import Table
 
+from cavsumo.assertions.base import HELD, INVALID, UNFAIR, VIOLATED
 from cavsumo.outcomes import cell, is_failure
 from cavsumo.statistics import Rate
 from cavsumo.tally import Found, Row, Tally, found_by
@@ -45,6 +46,9 @@ def summarise(ended: Sequence[Ended]) -> None:
     least = Measurement.get(console, console.options.update(width=WIDEST), table).minimum
     console.width = max(WIDTH, least)
     console.print(table, highlight=False)
+    if any(len(f.verdicts) > 1 for one in ended for f in one.tally.agents.values()):
+        console.print()
+        console.print(_verdicts(ended), highlight=False)
     if any(one.sequential for one in ended):
         _say(console, "intervals: beta-binomial confidence sequences, valid whenever one stops")
     together = found_by(found for one in ended for found in one.tally.agents.values())
@@ -55,6 +59,7 @@ def summarise(ended: Sequence[Ended]) -> None:
         f"\n{together.tests} tests in {rows} episodes, {together.failures} of them failed "
         f"by the ego.  {_files(ended)}",
     )
+    _say_invalid(ended, console)
     _say_errors(ended, console)
     if not together.failures and together.tests:
         sequential = any(one.sequential for one in ended)
@@ -74,12 +79,30 @@ def _table(ended: Sequence[Ended]) -> Table:
         table.add_column(title, overflow="fold")  # a path may be long
     for title in ("runs", "tests", "rate", "95 % interval", "failures", "of tests"):
         table.add_column(title, justify="right", no_wrap=True)
-    for title in ("unfair", "errors", "median time"):
+    invalid = any(one.tally.all.invalid for one in ended)
+    for title in ("unfair", *(["invalid"] if invalid else []), "errors", "median time"):
         table.add_column(title, justify="right", no_wrap=True)
     for one in ended:
         for i, (agent, found) in enumerate(one.tally.agents.items()):
             head = [one.name if i == 0 else "", agent] if several else [agent]
-            table.add_row(*head, *_cells(found, one.sequential))
+            table.add_row(*head, *_cells(found, one.sequential, invalid))
+    return table
+
+
+def _verdicts(ended: Sequence[Ended]) -> Table:
+    """One line an assertion, agent and batch: in how many episodes it said what."""
+    table = Table(box=None, pad_edge=False, padding=(0, 2, 0, 0))
+    several = any(one.name for one in ended)
+    for title in ("batch", "agent", "assertion") if several else ("agent", "assertion"):
+        table.add_column(title, overflow="fold")
+    for title in ("triggered", "held", "violated", "unfair"):
+        table.add_column(title, justify="right", no_wrap=True)
+    for one in ended:
+        for agent, found in one.tally.agents.items():
+            for name, said in found.verdicts.items():
+                head = [one.name, agent, name] if several else [agent, name]
+                counts = said[HELD] + said[VIOLATED], said[HELD], said[VIOLATED], said[UNFAIR]
+                table.add_row(*head, *map(str, counts))
     return table
 
 
@@ -107,23 +130,37 @@ def _say_shared(ended: Sequence[Ended], console: Console) -> None:
         )
 
 
+def _say_invalid(ended: Sequence[Ended], console: Console) -> None:
+    """In how many episodes a tester broke the rules of the world, and the first of them."""
+    count = sum(one.tally.all.invalid for one in ended)
+    row, where = _first(ended, INVALID)
+    if row is not None:
+        _say(console, f"{count} invalid; run {row['run']}{where}: {row['breach']}")
+
+
 def _say_errors(ended: Sequence[Ended], console: Console) -> None:
     """How many episodes could not be run, and the first of them."""
     errors = sum(one.tally.all.errors for one in ended)
+    row, where = _first(ended, "error")
+    if row is not None:
+        _say(
+            console,
+            f"{errors} could not be run; run {row['run']}{where}: {cell(row['error'])}"
+            "\n       run again with --retry-errors to play them again",
+        )
+
+
+def _first(ended: Sequence[Ended], what: str) -> tuple[Row | None, str]:
+    """The first row of a kind, and of which of several results it is."""
     for one in ended:
-        row = one.tally.first.get("error")
+        row = one.tally.first.get(what)
         if row is not None:
-            where = f" of {one.csv_file}" if len(ended) > 1 else ""
-            _say(
-                console,
-                f"{errors} could not be run; run {row['run']}{where}: {cell(row['error'])}"
-                "\n       run again with --retry-errors to play them again",
-            )
-            return
+            return row, f" of {one.csv_file}" if len(ended) > 1 else ""
+    return None, ""
 
 
-def _cells(found: Found, sequential: bool) -> list[str]:
-    """The cells of one agent."""
+def _cells(found: Found, sequential: bool, invalid: bool) -> list[str]:
+    """The cells of one agent; ``invalid``: with the number of invalid episodes."""
     tests, failures = (found.rate(r, sequential=sequential) for r in ("tests", "failures"))
     median = found.median_time()
     return [
@@ -134,6 +171,7 @@ def _cells(found: Found, sequential: bool) -> list[str]:
         str(found.failures),
         f"{percent(failures.value)} {interval(failures)}".strip(),
         str(found.unfair),
+        *([str(found.invalid)] if invalid else []),
         str(found.errors),
         "" if median is None else f"{median:.1f} s",
     ]

@@ -7,8 +7,8 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
-from cavsumo.assertions.base import HELD, UNFAIR, VIOLATED
-from cavsumo.outcomes import cell, is_failure, is_test
+from cavsumo.assertions.base import HELD, INVALID, UNFAIR, VIOLATED
+from cavsumo.outcomes import cell, is_failure, is_test, verdicts_of
 from cavsumo.statistics import Rate, rate, sequential_rate
 
 Row = Mapping[str, Any]
@@ -23,11 +23,13 @@ class Found:
         outcomes: how often each outcome came out.
         fresh: how many rows are of episodes in a simulation of their own.
         times: when tests were triggered, by time [s] to three decimals.
+        verdicts: for each assertion, how often it said what.
     """
 
     outcomes: Counter[str] = field(default_factory=Counter)
     fresh: int = 0
     times: Counter[float] = field(default_factory=Counter)
+    verdicts: dict[str, Counter[str]] = field(default_factory=dict)
 
     @property
     def episodes(self) -> int:
@@ -37,7 +39,7 @@ class Found:
     @property
     def valid(self) -> int:
         """How many count as tried."""
-        return self.episodes - self.outcomes["error"] - self.outcomes["invalid"]
+        return self.episodes - self.errors - self.invalid
 
     @property
     def tests(self) -> int:
@@ -53,6 +55,11 @@ class Found:
     def unfair(self) -> int:
         """How many left the ego no chance."""
         return self.outcomes[UNFAIR]
+
+    @property
+    def invalid(self) -> int:
+        """In how many a tester broke the rules of the world."""
+        return self.outcomes[INVALID]
 
     @property
     def errors(self) -> int:
@@ -78,7 +85,7 @@ class Tally:
 
     Attributes:
         agents: what each agent found, in the order in which they first appear.
-        first: the first row of each kind: "failure", "test", "error".
+        first: the first row of each kind: "failure", "test", "invalid", "error".
         rows: how many rows there were.
     """
 
@@ -93,13 +100,15 @@ class Tally:
         self.rows += 1
         found.outcomes[row["outcome"]] += 1
         found.fresh += row.get("reset") == "fresh"
+        for name, verdict in verdicts_of(row).items():
+            found.verdicts.setdefault(name, Counter())[verdict] += 1
         if is_test(row):
             found.times[float(cell(row["trigger_time_s"]))] += 1
             self.first.setdefault("test", row)
         if is_failure(row):
             self.first.setdefault("failure", row)
-        if row["outcome"] == "error":
-            self.first.setdefault("error", row)
+        if row["outcome"] in ("error", INVALID):
+            self.first.setdefault(row["outcome"], row)
 
     @property
     def all(self) -> Found:

@@ -8,9 +8,10 @@ from functools import cached_property
 from typing import Any
 
 from cavsumo.agents import Agent
+from cavsumo.assertions.base import INVALID, VIOLATED, Judgement
 from cavsumo.errors import CavsumoError, EgoError
 from cavsumo.jobs import Job, episode_seed, failed_row, head, make_agents
-from cavsumo.outcomes import Outcome, Row
+from cavsumo.outcomes import Outcome, Row, verdicts_cell
 from cavsumo.scenario import BatchPlan, Simulation
 from cavsumo.simulator import Episode, play
 from cavsumo.site import Site
@@ -95,20 +96,32 @@ class Theatre:
 def measured(episode: Episode) -> Row:
     """The columns of a row that a finished episode fills."""
     judgement, contacts = episode.judgement, episode.contacts
+    if episode.invalid and episode.breach:  # what the assertions said is in ``verdicts``
+        judgement = Judgement("", INVALID, episode.breach.tester)
+    ttc, drac, pet = episode.course.extremes()
     with_ego = {pair for pair in episode.sumo_collisions if "ego" in pair}
     return {
         "outcome": judgement.verdict,
+        "breach": str(episode.breach or ""),
+        "blame": episode.blame,
         "assertion": judgement.assertion if judgement.triggered else "",
+        "verdicts": verdicts_cell(episode.verdicts),
+        "robustness": _signed(judgement),
         "tester": judgement.tester,
         "trigger_time_s": judgement.trigger_time,
         "violation_time_s": judgement.violation_time,
         "time_s": episode.time,
         "steps": episode.steps,
         "min_gap_m": contacts.min_gap,
+        "min_ttc_s": ttc,
+        "max_drac_mps2": drac,
+        "pet_s": pet,
         "ego_speed_mps": judgement.ego_speed,
         "impact_speed_mps": judgement.impact_speed,
         "max_decel_mps2": episode.max_decel,
         "cost": episode.cost,
+        "accel_rms_mps2": episode.rms_acceleration,
+        "turning_rad": episode.conduct.turning,
         "reward": episode.reward,
         "contacts": len(contacts.ego_pairs),
         "tester_contacts": len(contacts.tester_pairs),
@@ -117,6 +130,12 @@ def measured(episode: Episode) -> Row:
         "emergency_stops": episode.emergency_stops,
         "teleports": episode.teleports,
     }
+
+
+def _signed(said: Judgement) -> float | None:
+    """The robustness as the CSV has it: rounded, what is violated stays below zero."""
+    value = said.robustness
+    return min(value, -0.001) if value is not None and said.verdict == VIOLATED else value
 
 
 def _recall(agents: Sequence[Agent]) -> tuple[Any, ...] | None:

@@ -98,8 +98,8 @@ class World:
         Args:
             simulation: "own" starts SUMO afresh, for the same bits whatever was before; "new"
                 starts one that serves several episodes, of which the later ones say "same".
-            everything: show the whole background and the traffic lights in every snapshot; else
-                only those who may touch the ego or a tester, which is all that contacts need.
+            everything: show the whole background in every snapshot; else only those who may touch
+                the ego or a tester, which is all that contacts need.
 
         Raises SimulationError with SUMO's own words when it refuses, or when the ego finds no
         room to enter.
@@ -120,7 +120,6 @@ class World:
             self._make_room(states, starts)
         self._ego = ego
         self._background = self._lookout(everything, (ego, *states))
-        self._lights = self.site.lights if everything else ()
         return self._snapshot(ego, tuple(states))
 
     def step(self, states: tuple[BodyState, ...], command: Command) -> Snapshot | None:
@@ -309,7 +308,7 @@ class World:
         raw = self._background.read(self._vehicles, persons, (ego, *states))
         time = round(self._step * self.dt, 6)
         state = libsumo.trafficlight.getRedYellowGreenState
-        lights = tuple([state(light.id)[light.link] for light in self._lights])
+        lights = tuple([state(light.id)[light.link] for light in self.site.lights])
         return Snapshot(self._step, time, ego, self._steering, states, raw, lights)
 
     def _lookout(self, everything: bool, watchers: Sequence[BodyState]) -> Background:

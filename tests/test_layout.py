@@ -18,15 +18,21 @@ PACKAGE = Path(cavsumo.__file__).parent
 ORDER = """
     cavsumo errors checks registry processes kinematics geometry paths bodies snapshot fairness
     roads sumo_poses background
+    metrics.following metrics.rss metrics.highway_code metrics.zones metrics.plane
+    metrics.encroachment metrics
     network ego_routes lane_chains approaches starts vehicle_starts kerbs signals trips traffic
-    site scene sight sensors
+    route_rules scene site sight sensors
     osm handedness netconvert facts surfaces inspection layers picture
     agents.base agents.walking agents.driving agents.triggers agents.random agents.features
     agents.manoeuvres agents.behaviours agents.programmed agents.election agents.qlearning agents
     observations policies agents.policy
     ego_observations
-    contacts
-    assertions.base assertions.collision assertions.reaction_zone assertions
+    contacts conduct criticality
+    assertions.base assertions.room assertions.collision assertions.reaction_zone
+    assertions.margin assertions.relations assertions.stopping_distance assertions.two_second_gap
+    assertions.speed_limit assertions.leaving_the_road assertions.red_light assertions.give_way
+    assertions.reasons assertions.standing assertions.hard_braking assertions.rss
+    assertions.criticality assertions validity blame
     egos.base egos.constant egos.sumo egos.time_gap egos.effectors egos.controller
     egos.protocol egos.link egos.child egos.wire egos.external egos.specs egos
     options labels scenario config study outcomes rewards ego_rewards

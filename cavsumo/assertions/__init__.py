@@ -3,7 +3,20 @@
 Importing this package registers the assertions that come with cavsumo.
 """
 
-from cavsumo.assertions import collision, reaction_zone  # noqa: F401  (imported to be registered)
-from cavsumo.assertions.base import ASSERTIONS, Assertion, Judgement
+from cavsumo.assertions import (  # noqa: F401  (imported to be registered)
+    collision,
+    criticality,
+    give_way,
+    hard_braking,
+    leaving_the_road,
+    reaction_zone,
+    red_light,
+    rss,
+    speed_limit,
+    standing,
+    stopping_distance,
+    two_second_gap,
+)
+from cavsumo.assertions.base import ASSERTIONS, Assertion, Judgement, make_assertions
 
-__all__ = ["ASSERTIONS", "Assertion", "Judgement"]
+__all__ = ["ASSERTIONS", "Assertion", "Judgement", "make_assertions"]

@@ -2,17 +2,20 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import Any, ClassVar
 
 from cavsumo.contacts import Contact
+from cavsumo.errors import InputError
 from cavsumo.registry import Registry
 from cavsumo.scene import Scene
 from cavsumo.snapshot import Snapshot
 
 # Verdicts, the most serious first: how several assertions make one outcome.
 VIOLATED, UNFAIR, HELD, NOT_TRIGGERED = "violated", "unfair", "held", "not_triggered"
+INVALID = "invalid"  # of an episode in which a tester broke the rules of the world (``validity``)
 SEVERITY = (VIOLATED, UNFAIR, HELD, NOT_TRIGGERED)
 
 
@@ -30,6 +33,8 @@ class Judgement:
             broken [s].
         ego_speed: speed of the ego at the violation, else at the trigger [m/s].
         impact_speed: closing speed of a contact [m/s].
+        robustness: how far the ego kept from a violation, in the assertion's unit: its smallest
+            margin since the trigger, negative if and only if violated; None before the trigger.
     """
 
     assertion: str
@@ -39,6 +44,7 @@ class Judgement:
     violation_time: float | None = None
     ego_speed: float | None = None
     impact_speed: float | None = None
+    robustness: float | None = None
 
     @property
     def triggered(self) -> bool:
@@ -54,12 +60,17 @@ class Assertion:
         judgement: what it says so far.
         decided: nothing that follows can change the judgement.
         pending: the precondition held and the verdict is still open, so the episode goes on.
-        sees_background: whether it looks at the background traffic in the snapshots; contacts with
-            it are reported in any case. See ``Agent.sees_background``.
+        sees_background: whether it looks at the background traffic or the traffic lights in the
+            snapshots; contacts are reported in any case. See ``Agent.sees_background``.
+        unconditional: it has no precondition, so that every episode is a test of it. Among several
+            assertions that it held makes no episode a test (``weightiest``).
+        unit: of the robustness.
     """
 
     PARAMETERS: ClassVar[Mapping[str, str]] = {}
     sees_background: bool = True
+    unconditional: ClassVar[bool] = False
+    unit: ClassVar[str] = ""
     name: ClassVar[str]
 
     judgement: Judgement
@@ -77,4 +88,34 @@ class Assertion:
         raise NotImplementedError
 
 
+def weightiest(assertions: Sequence[Assertion]) -> Judgement:
+    """The judgement that stands for an episode: the most serious, of equal ones the first.
+
+    Unless it is violated, an assertion without a precondition speaks only where there is no other:
+    that the ego kept to the speed limit does not make an episode a test of how it meets testers.
+    """
+    conditional = any(not a.unconditional for a in assertions)
+    heard = [
+        a.judgement
+        for a in assertions
+        if not (conditional and a.unconditional and a.judgement.verdict != VIOLATED)
+    ]
+    return min(heard, key=_weight)
+
+
+def _weight(said: Judgement) -> tuple[int, float]:
+    """Sort key: the most serious first, then the earliest."""
+    when = said.trigger_time if said.violation_time is None else said.violation_time
+    return SEVERITY.index(said.verdict), math.inf if when is None else when
+
+
 ASSERTIONS: Registry[Assertion] = Registry("assertion")
+
+
+def make_assertions(names: Sequence[str], params: Mapping[str, Any]) -> tuple[Assertion, ...]:
+    """The assertions named, each with the parameters meant for it (``Registry.shared``)."""
+    twice = sorted({name for name in names if names.count(name) > 1})
+    if twice:
+        raise InputError(f"assertion {twice[0]!r} is named twice")
+    given = ASSERTIONS.shared(names, params)
+    return tuple(ASSERTIONS.make(name, given[name]) for name in names)

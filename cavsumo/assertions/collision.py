@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import ClassVar
 
 from cavsumo.assertions.base import ASSERTIONS, HELD, VIOLATED, Assertion, Judgement
+from cavsumo.assertions.room import Room, impact
 from cavsumo.contacts import STANDING_MPS, Contact
 from cavsumo.scene import Scene
 from cavsumo.snapshot import Snapshot
@@ -15,19 +17,27 @@ from cavsumo.snapshot import Snapshot
 class CollisionAssertion(Assertion):
     """The moving ego touches no body at all. Precondition: none, every episode is a test.
 
-    A body that touches the standing ego walked into it and violates nothing.
+    A body that touches the standing ego walked into it and violates nothing. Robustness: smallest
+    gap of the moving ego to a tester [m]; of a contact minus the closing speed [m/s].
     """
 
     name: ClassVar[str] = "collision"
+    unit: ClassVar[str] = "m, minus m/s"
     sees_background = False
+    unconditional = True
 
     def reset(self, scene: Scene) -> None:
         super().reset(scene)
         self.judgement = Judgement(self.name, HELD, trigger_time=0.0)
+        self._room = Room()
 
     def observe(self, snapshot: Snapshot, contacts: Sequence[Contact]) -> None:
+        if self.decided or snapshot.ego.v <= STANDING_MPS:
+            return
+        if any([self._room.note(snapshot.ego, tester) for tester in snapshot.testers]):
+            self.judgement = replace(self.judgement, robustness=self._room.smallest)
         for contact in contacts:
-            if contact.a is snapshot.ego and snapshot.ego.v > STANDING_MPS and not self.decided:
+            if contact.a is snapshot.ego and not self.decided:
                 self.decided = True
                 self.judgement = Judgement(
                     self.name,
@@ -37,4 +47,5 @@ class CollisionAssertion(Assertion):
                     violation_time=contact.time,
                     ego_speed=snapshot.ego.v,
                     impact_speed=contact.closing_speed,
+                    robustness=impact(contact),
                 )

@@ -28,6 +28,7 @@ from cavsumo.assertions.base import (
     Assertion,
     Judgement,
 )
+from cavsumo.assertions.room import Room, impact
 from cavsumo.bodies import WALKING
 from cavsumo.checks import number
 from cavsumo.contacts import STANDING_MPS, Contact
@@ -44,10 +45,12 @@ class ReactionZoneAssertion(Assertion):
     """The ego hits no body it could have avoided (CAV-Gym's key assertion, the default).
 
     Decided by contact, by the ego having passed the body or standing clear of it, or by the body
-    having left the ego's way; whoever comes back after that meets the ego anew.
+    having left the ego's way; whoever comes back after that meets the ego anew. Robustness:
+    smallest gap to the body since the trigger [m]; of a violation minus the closing speed [m/s].
     """
 
     name: ClassVar[str] = "reaction-zone"
+    unit: ClassVar[str] = "m, minus m/s"
     sees_background = False
     PARAMETERS: ClassVar[Mapping[str, str]] = {
         "max_decel": "the deceleration that the zones assume [m/s2]",
@@ -66,6 +69,7 @@ class ReactionZoneAssertion(Assertion):
     def reset(self, scene: Scene) -> None:
         super().reset(scene)
         self._body: int | None = None
+        self._room = Room()
         self._standing_since: float | None = None
         self._clear_since: float | None = None
         vehicles = [body.kind.v_max for body in scene.bodies if body.kind.name not in WALKING]
@@ -102,6 +106,9 @@ class ReactionZoneAssertion(Assertion):
         elif fair:
             self._enter(snapshot, fair[0], HELD)
             self.pending, self._body = True, fair[0]
+            self._room.note(snapshot.ego, snapshot.testers[fair[0]])
+            room = self._room.smallest
+            self.judgement = dataclasses.replace(self.judgement, robustness=room)
 
     def _far(self, ego: BodyState) -> float:
         """No zone, arcs included, leads farther from the ego's centre than this [m]."""
@@ -159,9 +166,16 @@ class ReactionZoneAssertion(Assertion):
         """Wait for the contact, or until the ego has passed or stands clear."""
         ego = snapshot.ego
         hit = next((c for c in contacts if c.a is ego and c.b.id == body.id), None)
+        if self._room.note(ego, body):
+            room = self._room.smallest
+            self.judgement = dataclasses.replace(self.judgement, robustness=room)
         if hit is not None and is_vehicle(body) and ran_into(body, ego, self.scene.dt):
             self.judgement = dataclasses.replace(
-                self.judgement, verdict=UNFAIR, trigger_time=None, ego_speed=ego.v
+                self.judgement,
+                verdict=UNFAIR,
+                trigger_time=None,
+                ego_speed=ego.v,
+                robustness=None,
             )
             self._decide()
         elif hit is not None and ego.v > STANDING_MPS:
@@ -171,6 +185,7 @@ class ReactionZoneAssertion(Assertion):
                 violation_time=snapshot.time,
                 ego_speed=ego.v,
                 impact_speed=hit.closing_speed,
+                robustness=impact(hit),
             )
             self._decide()
         elif (

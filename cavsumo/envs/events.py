@@ -12,7 +12,7 @@ from cavsumo.theatre import measured
 # The keys of ``info`` with their meaning.
 KEYS = {
     "time_s": "simulation time since the ego entered",
-    "outcome": "the verdict so far: not_triggered, held, violated or unfair",
+    "outcome": "the verdict so far: not_triggered, held, violated, unfair or invalid",
     "events": "what began in this step, as dicts of event (trigger, unfair, violation, contact), "
     "time_s, tester (or the other body), and assertion (but for contacts)",
     "seed": "the episode's seed, as in results.csv (after reset only)",
@@ -33,7 +33,7 @@ class Watch:
         """Time, verdict and the events since the last call."""
         events = [*self._verdicts(), *self._contacts()]
         performance = self.performance
-        time, outcome = performance.snapshot.time, performance.judgement.verdict
+        time, outcome = performance.snapshot.time, performance.outcome
         return {"time_s": time, "outcome": outcome, "events": events}
 
     def summary(self) -> dict[str, Any]:

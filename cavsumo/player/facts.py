@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from cavsumo.assertions.base import HELD, UNFAIR, VIOLATED
+from cavsumo.assertions.base import HELD, INVALID, UNFAIR, VIOLATED
 from cavsumo.egos import make_ego
 from cavsumo.replays import Record
 from cavsumo.scenario import Scenario
@@ -30,6 +30,8 @@ def verdict(row: Mapping[str, str]) -> str:
         return f"A test that the ego passed: {triggered}, and it coped."
     if outcome == UNFAIR:
         return f"No fair test: {tester} left the ego no chance."
+    if outcome == INVALID:
+        return f"Not valid: {row['breach']}."
     return "No test: what the assertion asks for did not come about."
 
 
@@ -53,6 +55,8 @@ def facts(record: Record, trace: Trace) -> list[tuple[str, str]]:
         ("Assertion", " ".join(scenario.assertions)),
         ("Outcome", row["outcome"].replace("_", " ")),
         ("Tester involved", row["tester"]),
+        ("Blame", row.get("blame", "")),
+        ("Breach", row.get("breach", "")),
         ("Trigger", _with(row["trigger_time_s"], "s")),
         ("Violation", _with(row["violation_time_s"], "s")),
         ("Impact speed", _with(row["impact_speed_mps"], "m/s")),

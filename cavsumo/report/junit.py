@@ -10,6 +10,7 @@ from typing import Any
 
 import pandas
 
+from cavsumo.outcomes import verdicts_of
 from cavsumo.report.grouping import Group
 from cavsumo.report.load import Batch, Evidence
 from cavsumo.report.rates import Rates, rates
@@ -58,16 +59,20 @@ def _properties(parent: ET.Element, agent: str, found: Rates) -> None:
         if share.total:
             text += f", {percent(share.value)}, 95 % interval by {spans}"
         ET.SubElement(parent, "property", name=_legal(f"{agent}.{what}"), value=text)
+    if found.invalid:
+        text = f"{found.invalid} of {found.episodes} episodes"
+        ET.SubElement(parent, "property", name=_legal(f"{agent}.invalid"), value=text)
 
 
 def _case(batch: Batch, agent: str, assertion: str, rows: pandas.DataFrame) -> ET.Element:
     """One agent and assertion: failed, held, or never put to the test."""
-    tests = rows[rows["outcome"].isin(("held", "violated")) & (rows["assertion"] == assertion)]
-    failures = tests[tests["outcome"] == "violated"]
+    said = rows.apply(_verdict, axis=1, args=(assertion,)) if len(rows) else rows["outcome"]
+    tests, failures = rows[said.isin(("held", "violated"))], rows[said == "violated"]
     case = ET.Element("testcase", classname=_legal(agent), name=assertion)
     case.set("time", f"{rows['wall_s'].sum():.3f}")
     if len(failures):
-        told = [_replay(batch, row) for row in failures.head(SHOWN).to_dict("records")]
+        shown = failures.head(SHOWN).to_dict("records")
+        told = [_replay(batch, row, assertion) for row in shown]
         message = f"{len(failures)} of {len(tests)} tests failed; first: {told[0]}"
         _add(case, "failure", message, _with_rest(told, len(failures)), assertion)
     elif not len(tests):
@@ -77,10 +82,17 @@ def _case(batch: Batch, agent: str, assertion: str, rows: pandas.DataFrame) -> E
     return case
 
 
-def _replay(batch: Batch, row: Mapping[Any, Any]) -> str:
+def _verdict(row: Mapping[Any, Any], assertion: str) -> str:
+    """What an assertion said of an episode; the outcome, if it is the only one recorded."""
+    alone = row["outcome"] if row["assertion"] == assertion else ""
+    return verdicts_of(row).get(assertion, alone)
+
+
+def _replay(batch: Batch, row: Mapping[Any, Any], assertion: str) -> str:
     """What happened, and how to see it again."""
     command = shlex.join(["cavsumo", "replay", str(batch.csv_file), str(row["run"])])
-    return f"run {row['run']} (seed {row['seed']}): {event(row)}: {command}"
+    told = event(row) if row["assertion"] == assertion else f"{assertion} violated"
+    return f"run {row['run']} (seed {row['seed']}): {told}: {command}"
 
 
 def _errors(agent: str, rows: pandas.DataFrame) -> list[ET.Element]:

@@ -21,7 +21,7 @@ from cavsumo.stopping import looks_at_rows
 OUTCOMES = ("violated", "held", "unfair", "not_triggered", "invalid", "error")
 # What a report needs of the rows; other columns are read only when asked for.
 NUMBERS = ("trigger_time_s", "violation_time_s", "time_s", "impact_speed_mps", "wall_s")
-WORDS = ("agent", "outcome", "assertion", "tester", "trace", "error")
+WORDS = ("agent", "outcome", "assertion", "tester", "trace", "error", "verdicts")
 WHOLE = ("run", "seed")
 NEEDED = (*WHOLE, *WORDS, *NUMBERS)
 ADDED = ("file", "net")  # what one can group by besides the columns

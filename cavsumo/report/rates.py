@@ -40,11 +40,13 @@ class Rates(Told):
     """The shares of one group.
 
     Attributes:
-        episodes, errors: how many there are, how many could not be played.
+        episodes, invalid, errors: how many there are, in how many a tester broke the rules of the
+            world, how many could not be played.
         tests, failures, unfair: of valid episodes, of tests, of valid episodes.
     """
 
     episodes: int
+    invalid: int
     errors: int
     tests: Share
     failures: Share
@@ -58,6 +60,7 @@ def rates(group: Group) -> Rates:
     return Rates(
         *group.whose,
         episodes=found.episodes,
+        invalid=found.invalid,
         errors=found.errors,
         tests=share(found.tests, found.valid, "valid episodes", sequential=sequential),
         failures=share(found.failures, found.tests, "tests", sequential=sequential),

@@ -119,8 +119,10 @@ def _rates(found: Sequence[Rates], labels: Labels) -> Table:
             cells = [what, str(share.count), f"of {share.total} {share.of}", percent(share.value)]
             spans = [interval(share.intervals[m]) if m in share.intervals else "" for m in methods]
             rows.append([*labels.cells(one), *cells, *spans])
-        if one.errors:
-            cells = ["errors", str(one.errors), f"of {one.episodes} episodes", ""]
+        for what, count in (("invalid", one.invalid), ("errors", one.errors)):
+            if not count:
+                continue
+            cells = [what, str(count), f"of {one.episodes} episodes", ""]
             rows.append([*labels.cells(one), *cells, *("" for _ in methods)])
     titles = ("count", "", "share", *methods)
     words = (*labels.titles, "of what")

@@ -44,8 +44,7 @@ class Ground:
         starts = site.draw(kinds, ego, None, np.random.default_rng(seed))
         bodies = tuple(Body(f"tester{i}", kind) for i, kind in enumerate(kinds))
         driver = Body("ego", ego)
-        path, roads = site.route.path, site.roads
-        return Scene(self.dt, driver, path, bodies, starts, roads, site.lights, seed)
+        return site.scene(self.dt, driver, bodies, starts, seed)
 
 
 Shown = tuple[Snapshot, Command]  # a snapshot and what the ego answered

@@ -1,0 +1,157 @@
+"""Thresholds of criticality metrics: TTC, DRAC, PET (surrogate safety measures).
+
+The thresholds are the defaults of SUMO's SSM device, which measures vehicles only; here bodies are
+boxes on the plane, so that pedestrians count (``metrics.plane``, ``metrics.encroachment``). Looked
+at are the testers: background traffic on other lanes is on a course of collision at every bend.
+"""
+
+from __future__ import annotations
+
+import math
+from collections import deque
+from collections.abc import Callable, Iterator, Mapping
+from typing import ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cavsumo.assertions.base import ASSERTIONS
+from cavsumo.assertions.margin import Margin, MarginAssertion
+from cavsumo.checks import number
+from cavsumo.contacts import STANDING_MPS
+from cavsumo.geometry import Box, overlap
+from cavsumo.metrics.plane import drac_boxes, ttc_boxes
+from cavsumo.scene import Scene
+from cavsumo.snapshot import BodyState, Snapshot
+
+Metric = Callable[..., NDArray[np.float64]]
+COURSE_S = 10.0  # who would meet the ego later than this is on no course of collision
+FIRM = 100.0  # m/s2; deceleration to avoid a contact that is there already
+CROSSING = math.cos(math.radians(30.0))  # ways that meet at less do not cross
+
+
+def _velocity(state: BodyState) -> tuple[float, float]:
+    return state.v * math.cos(state.o), state.v * math.sin(state.o)
+
+
+def _near(snapshot: Snapshot) -> list[BodyState]:
+    """The testers who could meet the moving ego within ``COURSE_S``."""
+    ego = snapshot.ego
+    if ego.v <= STANDING_MPS:
+        return []
+    return [
+        t
+        for t in snapshot.testers
+        if math.hypot(t.x - ego.x, t.y - ego.y)
+        <= ego.body.kind.reach + t.body.kind.reach + (ego.v + t.v) * COURSE_S
+    ]
+
+
+def measured(metric: Metric, snapshot: Snapshot) -> Iterator[Margin]:
+    """A metric of the moving ego and each tester that could meet it."""
+    near, ego = _near(snapshot), snapshot.ego
+    if near:
+        boxes, velocities = [t.box for t in near], [_velocity(t) for t in near]
+        values = metric(ego.box, _velocity(ego), boxes, velocities)
+        yield from zip([t.id for t in near], map(float, values), strict=True)
+
+
+@ASSERTIONS.register("ttc")
+class TtcAssertion(MarginAssertion):
+    """The time to collision with a tester stays above 3 s (Hayward 1972; SUMO's SSM device).
+
+    Precondition: at constant velocities the moving ego would touch a tester within 10 s. Violated
+    by less than ``least_s``. Robustness: smallest TTC less ``least_s`` [s]. Bodies: testers.
+    """
+
+    name: ClassVar[str] = "ttc"
+    unit: ClassVar[str] = "s"
+    sees_background = False
+    PARAMETERS: ClassVar[Mapping[str, str]] = {"least_s": "smallest time to collision [s]"}
+
+    def __init__(self, least_s: float = 3.0) -> None:
+        self.least_s = number("least_s", least_s, 0.0, COURSE_S)
+
+    def margins(self, snapshot: Snapshot, before: Snapshot | None) -> Iterator[Margin]:
+        for who, ttc in measured(ttc_boxes, snapshot):
+            if ttc <= COURSE_S:
+                yield who, ttc - self.least_s
+
+
+@ASSERTIONS.register("drac")
+class DracAssertion(MarginAssertion):
+    """The deceleration to avoid a tester stays below 3 m/s2 (Guido et al. 2011; SUMO's SSM device).
+
+    Precondition: as for ttc. Violated by more than ``most``. Robustness: ``most`` less the largest
+    DRAC [m/s2], which is 100 m/s2 at contact. Bodies: testers.
+    """
+
+    name: ClassVar[str] = "drac"
+    unit: ClassVar[str] = "m/s2"
+    sees_background = False
+    PARAMETERS: ClassVar[Mapping[str, str]] = {"most": "largest deceleration to need [m/s2]"}
+
+    def __init__(self, most: float = 3.0) -> None:
+        self.most = number("most", most, 0.0, FIRM)
+
+    def margins(self, snapshot: Snapshot, before: Snapshot | None) -> Iterator[Margin]:
+        for who, drac in measured(drac_boxes, snapshot):
+            if drac > 0.0:
+                yield who, self.most - min(drac, FIRM)
+
+
+@ASSERTIONS.register("pet")
+class PetAssertion(MarginAssertion):
+    """The ego and a tester cross the same place at least 2 s apart (Allen et al. 1978; SUMO's SSM).
+
+    Precondition: one of them comes to a place that the other left at most 10 s before, on a way
+    that crosses the other's by more than 30 degrees. Violated by a post-encroachment time below
+    ``least_s``. Robustness: smallest PET less ``least_s`` [s]. Bodies: testers. Whoever comes
+    second is not asked: a tester who steps in behind the ego counts as well.
+    """
+
+    name: ClassVar[str] = "pet"
+    unit: ClassVar[str] = "s"
+    sees_background = False
+    PARAMETERS: ClassVar[Mapping[str, str]] = {"least_s": "smallest post-encroachment time [s]"}
+
+    def __init__(self, least_s: float = 2.0) -> None:
+        self.least_s = number("least_s", least_s, 0.0, COURSE_S)
+
+    def reset(self, scene: Scene) -> None:
+        super().reset(scene)
+        self._tracks: dict[str, deque[tuple[float, Box]]] = {}
+
+    def margins(self, snapshot: Snapshot, before: Snapshot | None) -> Iterator[Margin]:
+        now, ego = snapshot.time, snapshot.ego
+        self._note(now, ego)
+        for tester in snapshot.testers:
+            self._note(now, tester)
+            met = [
+                self._last_there(ego.box, tester.id, now),
+                self._last_there(tester.box, ego.id, now),
+            ]
+            times = [now - t for t in met if t is not None]
+            if times:
+                yield tester.id, min(times) - self.least_s
+
+    def _note(self, now: float, state: BodyState) -> None:
+        """Add to a body's track; while it stands only the last time counts."""
+        track = self._tracks.setdefault(state.id, deque())
+        box = state.box
+        if track and track[-1][1] == box:
+            track.pop()
+        track.append((now, box))
+        while len(track) > 1 and track[0][0] < now - COURSE_S:
+            track.popleft()
+
+    def _last_there(self, box: Box, name: str, now: float) -> float | None:
+        """When a body was last where a box is now, on a way across it."""
+        x, y, o, length, width = box
+        for time, other in reversed(self._tracks.get(name, ())):
+            reach = 0.5 * (length + width + other.length + other.width)
+            if abs(other.x - x) > reach or abs(other.y - y) > reach:
+                continue
+            if abs(math.cos(other.heading - o)) < CROSSING and overlap(box, other):
+                return time if time >= now - COURSE_S else None
+        return None

@@ -1,0 +1,35 @@
+"""What an ego may have to stop or to brake for, generously told."""
+
+from __future__ import annotations
+
+import math
+
+from cavsumo.assertions.red_light import AMBER, RED
+from cavsumo.assertions.relations import Relation, front_along, relations
+from cavsumo.contacts import STANDING_MPS
+from cavsumo.fairness import is_vehicle
+from cavsumo.scene import Scene
+from cavsumo.snapshot import Snapshot
+
+BESIDE_M = 1.0  # who stands this near the ego's strip may be about to enter it
+
+
+def has_reason(scene: Scene, snapshot: Snapshot, within: float) -> bool:
+    """Whether somebody or a traffic light within a distance ahead is a reason to stop [m].
+
+    Somebody in the ego's way or at most a metre beside it, somebody who comes towards it, a vehicle
+    that moves near it (the ego may have to give way), a light that is not green.
+    """
+    front = front_along(scene, snapshot)
+    for light, shown in zip(scene.lights, snapshot.lights, strict=False):
+        if 0.0 <= light.along - front <= within and shown in RED + AMBER:
+            return True
+    return any(_concerns(other) for other in relations(scene, snapshot, within))
+
+
+def _concerns(other: Relation) -> bool:
+    """Whether somebody ahead is a reason to stop."""
+    if other.aside <= BESIDE_M:
+        return True
+    moves = math.hypot(other.onward, other.sideways) > STANDING_MPS
+    return moves and (is_vehicle(other.body) or other.sideways > STANDING_MPS)
