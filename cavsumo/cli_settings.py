@@ -30,6 +30,9 @@ def settings_of(options: argparse.Namespace) -> dict[str, Any]:
             raise InputError(f"--ego-route: expected edges, got {options.ego_route!r}")
     given["additional"] = options.additional_files and options.additional_files.split(",")
     settings |= {key: value for key, value in given.items() if value is not None}
+    if options.formula:
+        formulas = dict(_formula(word) for word in options.formula)
+        settings["formulas"] = _table(settings, "formulas") | formulas
     for key, words in (
         ("params", options.param),
         ("ego_params", options.ego_param),
@@ -38,11 +41,24 @@ def settings_of(options: argparse.Namespace) -> dict[str, Any]:
         ("tester_sensor", options.tester_sensor),
     ):
         if words:
-            table = settings.get(key, {})
-            if not isinstance(table, dict):
-                raise InputError(f"{key}: expected a table in the scenario file, got {table!r}")
-            settings[key] = table | dict(assignment(key, w) for w in words)
+            settings[key] = _table(settings, key) | dict(assignment(key, w) for w in words)
     return settings
+
+
+def _table(settings: dict[str, Any], key: str) -> dict[str, Any]:
+    """A table of the scenario file, empty if it has none."""
+    table = settings.get(key, {})
+    if not isinstance(table, dict):
+        raise InputError(f"{key}: expected a table in the scenario file, got {table!r}")
+    return table
+
+
+def _formula(word: str) -> tuple[str, str]:
+    """NAME=TEXT as two."""
+    name, equals, text = word.partition("=")
+    if not (equals and text.strip()):
+        raise InputError(f"--formula: expected NAME=TEXT, got {word!r}")
+    return name.strip(), text.strip()
 
 
 def assignment(option: str, word: str) -> tuple[str, bool | int | float | str]:

@@ -23,10 +23,12 @@ def listing(sort: str, name: str | None) -> str:
     registry = registries()[sort]
     if name is None:
         lines = {n: registry.summary(n) for n in registry}
-        return "\n".join(_columns(lines | (_forms() if sort == "egos" else {})))
+        return "\n".join(_columns(lines | _forms(sort)))
     if sort == "egos":
         registry = _registry_of(name, registry)
-    name = name.partition(":")[0]
+        name = name.partition(":")[0]
+    elif sort == "assertions":
+        registry = _with_own(name)
     shown = {
         f"{p.name}={p.default}": p.doc
         for p in registry.parameters(name)
@@ -43,11 +45,24 @@ def _columns(lines: Mapping[str, str]) -> list[str]:
     return [f"{first:{width}}  {second}" for first, second in lines.items()]
 
 
-def _forms() -> dict[str, str]:
-    """How an ego from the user is named."""
-    from cavsumo.egos.specs import FORMS
+def _forms(sort: str) -> dict[str, str]:
+    """How egos and assertions from the user are named."""
+    if sort == "egos":
+        from cavsumo.egos.specs import FORMS
 
-    return dict(FORMS)
+        return dict(FORMS)
+    if sort == "assertions":
+        from cavsumo.assertions.specs import FORMS
+
+        return dict(FORMS)
+    return {}
+
+
+def _with_own(assertion: str) -> Registry[Any]:
+    """The assertions, with the user's own if it is one."""
+    from cavsumo.assertions.specs import registry_of
+
+    return registry_of([assertion], {})
 
 
 def _registry_of(ego: str, registered: Registry[Any]) -> Registry[Any]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import inspect
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any, Generic, TypeVar
 
@@ -68,6 +68,33 @@ class Registry(Generic[T]):
             for p in inspect.signature(entry).parameters.values()
             if p.kind in (p.POSITIONAL_OR_KEYWORD, p.KEYWORD_ONLY)
         ]
+
+    def shared(
+        self, names: Iterable[str], params: Mapping[str, Any], source: str = ""
+    ) -> dict[str, dict[str, Any]]:
+        """Parameters given for several entries, by entry: ``KEY`` for all that have it, and
+        ``NAME.KEY`` for one of them, which goes before.
+
+        Raises UnknownName for a key that none of them has.
+        """
+        known = {name: {p.name for p in self.parameters(name)} for name in names}
+        everybodys = {key for keys in known.values() for key in keys}
+        qualified = {f"{name}.{key}" for name, keys in known.items() for key in keys}
+        for key in params:
+            valid = qualified if "." in key else everybodys
+            if key not in valid:
+                raise UnknownName(
+                    "parameter", key, valid, source or f"{self.sort} {' '.join(known)}"
+                )
+        return {
+            name: {key: value for key, value in params.items() if key in keys}
+            | {
+                key.removeprefix(f"{name}."): value
+                for key, value in params.items()
+                if key.startswith(f"{name}.")
+            }
+            for name, keys in known.items()
+        }
 
     def make(self, name: str, params: Mapping[str, Any]) -> T:
         """Build an entry; unknown parameters and values that it refuses are InputErrors."""

@@ -274,6 +274,8 @@ def _at_end(scene: Scene, snapshot: Snapshot) -> bool:
 
 def _finished(stage: Stage, episode: Episode, snapshot: Snapshot, ledger: Ledger) -> Episode:
     """The episode with its totals."""
+    for assertion in stage.assertions:
+        assertion.conclude()
     judgements = [a.judgement for a in stage.assertions]
     episode.judgement = min(judgements, key=lambda j: SEVERITY.index(j.verdict))
     episode.steps, episode.time = snapshot.step, snapshot.time

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from cavsumo.assertions import ASSERTIONS
+from cavsumo.assertions import make_assertions
 from cavsumo.assertions.base import Assertion
 from cavsumo.bodies import Body
 from cavsumo.egos import make_ego
@@ -60,8 +60,11 @@ def set_stage(scenario: Scenario, site: Site, ego: Ego | None = None) -> Stage:
         world=World(scenario, site, ego),
         site=site,
         ego=ego,
-        assertions=tuple(
-            ASSERTIONS.make(name, scenario.assertion_params) for name in scenario.assertions
+        assertions=make_assertions(
+            scenario.assertions,
+            scenario.assertion_params,
+            scenario.formulas,
+            scenario.step_length,
         ),
         teams=teams(scenario),
         bodies=tester_bodies(scenario),

@@ -16,8 +16,8 @@ PACKAGE = Path(cavsumo.__file__).parent
 
 # From the ground up: a module uses only what stands before it, lazily or not.
 ORDER = """
-    cavsumo errors checks registry processes kinematics geometry paths bodies snapshot fairness
-    roads sumo_poses background
+    cavsumo errors checks registry imports processes kinematics geometry paths bodies snapshot
+    fairness roads sumo_poses background
     metrics.following metrics.rss metrics.highway_code metrics.zones metrics.plane
     metrics.encroachment metrics
     network ego_routes lane_chains approaches starts vehicle_starts kerbs signals trips traffic
@@ -26,7 +26,10 @@ ORDER = """
     agents.base agents.walking agents.driving agents.triggers agents.random agents.features
     agents.manoeuvres agents.behaviours agents.programmed agents.election agents.qlearning agents
     contacts
-    assertions.base assertions.collision assertions.reaction_zone assertions
+    formulas.nodes formulas.words formulas.syntax formulas.windows formulas.semantics
+    formulas.signals formulas.rules formulas
+    assertions.base assertions.collision assertions.reaction_zone assertions.formula
+    assertions.custom assertions.specs assertions
     egos.base egos.constant egos.sumo egos.time_gap egos.effectors egos.controller
     egos.protocol egos.link egos.child egos.wire egos.external egos.specs egos
     options scenario outcomes rewards sumo_types demand simulations world

@@ -30,6 +30,8 @@ class Judgement:
             broken [s].
         ego_speed: speed of the ego at the violation, else at the trigger [m/s].
         impact_speed: closing speed of a contact [m/s].
+        robustness: how far the ego kept from a violation, in the assertion's unit: its smallest
+            margin since the trigger, negative if and only if violated; None before the trigger.
     """
 
     assertion: str
@@ -39,6 +41,7 @@ class Judgement:
     violation_time: float | None = None
     ego_speed: float | None = None
     impact_speed: float | None = None
+    robustness: float | None = None
 
     @property
     def triggered(self) -> bool:
@@ -75,6 +78,9 @@ class Assertion:
     def observe(self, snapshot: Snapshot, contacts: Sequence[Contact]) -> None:
         """Take in a snapshot and the contacts that begin in it."""
         raise NotImplementedError
+
+    def conclude(self) -> None:
+        """The episode is over: what was judged once all is known is judged now."""
 
 
 ASSERTIONS: Registry[Assertion] = Registry("assertion")
