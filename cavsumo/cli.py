@@ -14,7 +14,7 @@ from cavsumo.cli_egos import add_check_ego
 from cavsumo.cli_networks import add_import_osm, add_inspect
 from cavsumo.cli_results import add_merge, add_replay, add_report
 from cavsumo.cli_settings import settings_of
-from cavsumo.errors import BatchError, CavsumoError, Exit, InputError
+from cavsumo.errors import BatchError, CavsumoError, DivergenceError, Exit, InputError
 
 HYPHENATED = ("--bbox", "--ego-route", "--junction")  # options whose values may begin with "-"
 
@@ -26,6 +26,9 @@ def main(argv: Sequence[str] | None = None) -> int:
         options = _parser().parse_args(_joined(words))
         status: int = options.command(options)
         return status
+    except DivergenceError as error:
+        print(f"cavsumo: {error}", file=sys.stderr)
+        return Exit.VIOLATED
     except CavsumoError as error:
         print(f"cavsumo: {error}", file=sys.stderr)
         return Exit.NOT_RUN if isinstance(error, BatchError) else Exit.USAGE

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import dataclasses
 from pathlib import Path
 from typing import Any
 
@@ -12,11 +13,25 @@ def add_replay(commands: Any) -> None:
     replay = commands.add_parser(
         "replay",
         help="run one recorded episode again and check, step by step, that it is the same",
-        description="Run one recorded episode again and check, step by step, that it is the same.",
+        description="Run one recorded episode again and check, step by step, that it is the same; "
+        "then show it, if wanted. A trace can be replayed from its file alone: the network is "
+        "looked for where it was and beside the trace.",
         allow_abbrev=False,
     )
-    replay.add_argument("results", type=Path, help="the CSV of a batch")
-    replay.add_argument("run", type=int, help="number of the episode")
+    add = replay.add_argument
+    add("results", type=Path, help="the CSV of a batch, or a trace (.jsonl)")
+    add("run", type=int, nargs="?", help="number of the episode, if that is a CSV")
+    add("--html", type=Path, metavar="FILE", help="write it as one page that any browser plays")
+    add("--fcd", type=Path, metavar="FILE", help="write it as SUMO's floating car data")
+    add("--gui", action="store_true", help="show it in sumo-gui (pip install 'cavsumo[osm]')")
+    add("--delay", type=float, metavar="MS", help="of --gui: how long a timestep is shown")
+    add(
+        "--recorded",
+        action="store_true",
+        help="show what was recorded, without running it again: with other versions, say",
+    )
+    add("-n", "--net", type=Path, metavar="FILE", help="where the network is now")
+    add("-r", "--routes", type=Path, metavar="FILE", help="where the routes are now")
     replay.set_defaults(command=_replay)
 
 
@@ -47,6 +62,15 @@ def add_report(commands: Any) -> None:
     )
     add("-o", "--output", type=Path, metavar="FILE", help="write it there instead of printing it")
     add("--junit", type=Path, metavar="FILE", help="also write JUnit XML")
+    add("--html", type=Path, metavar="FILE", help="also write it as one page for the browser")
+    add(
+        "--replays",
+        type=int,
+        default=20,
+        metavar="N",
+        help="of --html: so many failures, and half as many passed tests, as pages that play "
+        "them, in a folder beside it (default 20)",
+    )
     report.set_defaults(command=_report)
 
 
@@ -66,15 +90,17 @@ def add_merge(commands: Any) -> None:
 
 
 def _replay(options: argparse.Namespace) -> int:
-    from cavsumo.commands.replay import replay
+    from cavsumo.commands.replay import Wanted, replay
 
-    return replay(options.results, options.run)
+    names = [field.name for field in dataclasses.fields(Wanted)]
+    return replay(options.results, Wanted(**{name: getattr(options, name) for name in names}))
 
 
 def _report(options: argparse.Namespace) -> int:
-    from cavsumo.commands.report import report
+    from cavsumo.commands.report import Wanted, report
 
-    return report(options.results, options.by, options.format, options.output, options.junit)
+    names = [field.name for field in dataclasses.fields(Wanted)]
+    return report(options.results, Wanted(**{name: getattr(options, name) for name in names}))
 
 
 def _merge(options: argparse.Namespace) -> int:

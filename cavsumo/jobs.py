@@ -6,13 +6,15 @@ Imported by the parent process, so nothing here touches SUMO.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from cavsumo.agents import AGENTS, Agent
+from cavsumo.agents import Agent
+from cavsumo.agents.policy import make_agent, parameters_of, policy_file
 from cavsumo.bodies import Body, kind_named, model_of
-from cavsumo.errors import UnknownName
+from cavsumo.errors import InputError, UnknownName
 from cavsumo.outcomes import Outcome, Row
 from cavsumo.scenario import BatchPlan, Scenario, Simulation
 
@@ -53,9 +55,14 @@ def job(plan: BatchPlan, run: int, memory: tuple[Any, ...] | None = None) -> Job
 
 def make_agents(plan: BatchPlan, name: str) -> list[Agent]:
     """The agents of one name, one for each team."""
-    known = {name: [p.name for p in AGENTS.parameters(name)]}
+    known = {name: [p.name for p in parameters_of(name)]}
     params = plan.agent_params(name, known)
-    return [AGENTS.make(name, params) for _ in teams(plan.scenario)]
+    return [make_agent(name, params) for _ in teams(plan.scenario)]
+
+
+def policy_files(plan: BatchPlan) -> list[Path]:
+    """The files of the agents that are policies."""
+    return [file for name in plan.agents if (file := policy_file(name)) is not None]
 
 
 def learners(plan: BatchPlan) -> frozenset[str]:
@@ -104,12 +111,17 @@ def head(plan: BatchPlan, job: Job) -> Row:
 
 def check_agents(plan: BatchPlan) -> None:
     """Build every agent once and account for every parameter, before anything starts."""
-    known = {name: [p.name for p in AGENTS.parameters(name)] for name in plan.agents}
+    known = {name: [p.name for p in parameters_of(name)] for name in plan.agents}
     shared = {key for keys in known.values() for key in keys}
     qualified = {f"{name}.{key}" for name, keys in known.items() for key in keys}
     for key in plan.params:
         valid = qualified if "." in key else shared
         if key not in valid:
             raise UnknownName("parameter", key, valid, f"agent {' '.join(plan.agents)}")
+    kind = kind_named(plan.scenario.kind)
     for name in plan.agents:
-        make_agents(plan, name)
+        for agent in make_agents(plan, name)[:1]:
+            try:
+                agent.check_bodies(kind, plan.scenario.bodies_per_agent)
+            except ValueError as error:
+                raise InputError(f"agent {name}: {error}") from error

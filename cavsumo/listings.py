@@ -21,9 +21,11 @@ def registries() -> dict[str, Registry[Any]]:
 def listing(sort: str, name: str | None) -> str:
     """One line for each entry, or one entry with its parameters, defaults and units."""
     registry = registries()[sort]
+    if sort == "agents" and name is not None and name.startswith("policy:"):
+        return _policy(name)
     if name is None:
         lines = {n: registry.summary(n) for n in registry}
-        return "\n".join(_columns(lines | _forms(sort)))
+        return "\n".join(_columns({**lines, **_forms(sort)}))
     if sort == "egos":
         registry = _registry_of(name, registry)
         name = name.partition(":")[0]
@@ -45,17 +47,14 @@ def _columns(lines: Mapping[str, str]) -> list[str]:
     return [f"{first:{width}}  {second}" for first, second in lines.items()]
 
 
-def _forms(sort: str) -> dict[str, str]:
-    """How egos and assertions from the user are named."""
-    if sort == "egos":
-        from cavsumo.egos.specs import FORMS
+def _forms(sort: str) -> Mapping[str, str]:
+    """How one from the user is named."""
+    from cavsumo.assertions import specs as assertions
+    from cavsumo.egos import specs as egos
 
-        return dict(FORMS)
-    if sort == "assertions":
-        from cavsumo.assertions.specs import FORMS
-
-        return dict(FORMS)
-    return {}
+    policies = {"policy:FILE": "a tester that you trained, in a policy file (.npz)"}
+    forms = {"egos": egos.FORMS, "assertions": assertions.FORMS, "agents": policies}
+    return forms.get(sort, {})
 
 
 def _with_own(assertion: str) -> Registry[Any]:
@@ -70,3 +69,22 @@ def _registry_of(ego: str, registered: Registry[Any]) -> Registry[Any]:
     from cavsumo.egos.external import EXTERNAL
 
     return EXTERNAL if ego.partition(":")[0] in EXTERNAL else registered
+
+
+def _policy(spec: str) -> str:
+    """What a policy file says of itself."""
+    from cavsumo.agents.policy import policy_file
+    from cavsumo.policies import read_policy
+
+    file = policy_file(spec)
+    assert file is not None
+    policy = read_policy(file)
+    header = policy.header
+    sizes = [len(policy.mean), *(len(biases) for _, biases in policy.layers)]
+    facts: dict[str, str] = {
+        "bodies": f"{header.bodies} {header.kind} a team",
+        "actions": f"{header.actions}, each for {header.hold} timesteps",
+        "network": f"{' > '.join(map(str, sizes))}, {header.activation}",
+    } | {key: str(value) for key, value in header.metadata.items()}
+    title = f"{spec}: a trained policy; what it is shown: cavsumo/observations.py"
+    return "\n".join([title, *(f"  {line}" for line in _columns(facts))])

@@ -39,6 +39,12 @@ def ending(code: int) -> str:
     return f"ended with status {code}"
 
 
+def inner_environment() -> dict[str, str]:
+    """The environment of a process of ours, which finds the modules that this one finds."""
+    outer = os.environ.get("PYTHONPATH", "")
+    return {**os.environ, "PYTHONPATH": os.pathsep.join(sys.path), OUTER_PATH: outer}
+
+
 def outer_environment() -> dict[str, str]:
     """The environment without what was added to find our own modules in a process of ours."""
     environment = dict(os.environ)

@@ -1,13 +1,10 @@
-"""Results on disk, read: manifest, rows and traces, with one sentence when they are damaged."""
+"""Results on disk, read: manifest and rows, with one sentence when they are damaged."""
 
 from __future__ import annotations
 
 import csv
-import itertools
 import json
-import math
-import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -20,7 +17,6 @@ if TYPE_CHECKING:
 FORMAT = "cavsumo-results-1"
 STARTING = "starting"  # a manifest that says so owns none of the rows that lie beside it
 COMPLETE = ("finished", "stopped", STARTING)  # the statuses of which no row would be missed
-FRAME_KEYS = {"step", "time_s", "ego", "steering", "testers", "background"}
 HEADER = ",".join(COLUMNS) + "\n"
 
 
@@ -117,52 +113,6 @@ def _parsed(line: bytes, place: str) -> dict[str, str]:
     if not row["run"].isdecimal():
         raise ResultsError(f"{place} begins with {row['run']!r}, expected the number of a run")
     return row
-
-
-def read_trace(file: Path) -> list[dict[str, Any]]:
-    """The frames of a trace."""
-    try:
-        lines = file.read_text(encoding="utf-8").splitlines()
-        return [_frame(line) for line in lines[1:]]
-    except (OSError, ValueError, TypeError) as error:
-        raise ResultsError(f"trace {str(file)!r}: cannot be read: {error}") from error
-
-
-def read_moments(file: Path, times: Sequence[float]) -> list[tuple[float, dict[str, Any]]]:
-    """For each time [s] the nearest frame of a trace, and how far the ego has driven by then [m].
-
-    Only those frames are parsed as a whole: traces are long, and a report reads thousands.
-    """
-    try:
-        with file.open(encoding="utf-8") as stream:
-            lines = stream.readlines()[1:]  # the first says whose trace it is
-        passing = list(map(_passing, lines))
-        steps = (math.dist(a[1:], b[1:]) for a, b in itertools.pairwise(passing))
-        driven = list(itertools.accumulate(steps, initial=0.0))
-        nearest = [min(range(len(lines)), key=lambda i: abs(passing[i][0] - t)) for t in times]
-        return [(driven[i], _frame(lines[i])) for i in nearest]
-    except (OSError, ValueError, TypeError) as error:
-        raise ResultsError(f"trace {str(file)!r}: cannot be read: {error}") from error
-
-
-_POSE = re.compile(r'"time_s":\s*([^,]+),\s*"ego":\s*\[([^,]+),([^,]+),')
-
-
-def _passing(line: str) -> tuple[float, float, float]:
-    """The time [s] and the ego's position [m] in a line of a trace."""
-    found = _POSE.search(line)
-    if found is None:
-        raise ValueError("a frame without time_s and ego, one after the other")
-    time, x, y = map(float, found.groups())
-    return time, x, y
-
-
-def _frame(line: str) -> dict[str, Any]:
-    """A line of a trace."""
-    found: dict[str, Any] = json.loads(line)
-    if not set(found) >= FRAME_KEYS:
-        raise ValueError(f"a frame without {', '.join(sorted(FRAME_KEYS - set(found)))}")
-    return found
 
 
 def read_results(csv_file: Path) -> pandas.DataFrame:

@@ -317,11 +317,19 @@ def _route_file(scenario: Mapping[str, Any], source: str) -> Path | None:
 
 def _resolved(key: str, value: Any, folder: Path) -> Any:
     """A path of a scenario file, relative to that file, as SUMO has it in its own."""
+    if key == "agents" and isinstance(value, list):
+        return [_resolved_agent(name, folder) for name in value]
     if key not in PATH_KEYS or value == "none":
         return value
     if isinstance(value, list):
         return [str(folder / str(v)) for v in value]
     return str(folder / str(value))
+
+
+def _resolved_agent(name: Any, folder: Path) -> Any:
+    """An agent of a scenario file; the file of a policy is a path like others."""
+    prefix, colon, file = str(name).partition(":")
+    return f"{prefix}:{folder / file}" if prefix == "policy" and colon and file else name
 
 
 def _first_problem(error: ValidationError) -> str:

@@ -24,7 +24,7 @@ from cavsumo.egos import make_ego
 from cavsumo.egos.base import Ego
 from cavsumo.egos.specs import ego_files
 from cavsumo.errors import InputError
-from cavsumo.jobs import check_agents, learners, make_agents
+from cavsumo.jobs import check_agents, learners, make_agents, policy_files
 from cavsumo.options import OPTIONS
 from cavsumo.scenario import BatchPlan
 from cavsumo.signals import Pace
@@ -67,8 +67,11 @@ class Setting:
             raise InputError(f"{name} is {here} in the process that simulates, expected {there}")
 
 
-def prepare(plan: BatchPlan) -> Setting:
-    """Check every name and parameter of a plan and derive its site; raises InputError."""
+def prepare(plan: BatchPlan, ego: Ego | None = None) -> Setting:
+    """Check every name and parameter of a plan and derive its site; raises InputError.
+
+    ``ego`` drives instead of the one that the plan names.
+    """
     scenario = plan.scenario
     check_agents(plan)
     make_assertions(
@@ -82,7 +85,7 @@ def prepare(plan: BatchPlan) -> Setting:
             f"{what}: {' and '.join(sorted(learners(plan)))} learns from episode to episode, in "
             "sequence; learn=false plays what was learned"
         )
-    ego = make_ego(scenario.ego, scenario.ego_params)
+    ego = ego or make_ego(scenario.ego, scenario.ego_params)
     if scenario.ego_sensor and type(ego).act is Ego.act:
         raise InputError(
             f"ego_sensor: ego {scenario.ego} is driven by SUMO, which sees everybody; a sensor "
@@ -150,11 +153,12 @@ def checksums(plan: BatchPlan) -> dict[str, str]:
     """The SHA-256 of every file that a plan names, those of its ego and assertions among them."""
     scenario = plan.scenario
     files = [scenario.net, *([scenario.routes] if scenario.routes else []), *scenario.additional]
-    files += [*ego_files(scenario.ego), *assertion_files(scenario.assertions)]
-    return {str(file): _sha256(file) for file in files}
+    files += [*policy_files(plan), *ego_files(scenario.ego)]
+    files += assertion_files(scenario.assertions)
+    return {str(file): checksum(file) for file in files}
 
 
-def _sha256(file: Path) -> str:
+def checksum(file: Path) -> str:
     """The SHA-256 of a file, which may be large."""
     try:
         with file.open("rb") as stream:
@@ -178,13 +182,13 @@ def manifest(setting: Setting) -> dict[str, Any]:
         "plan": setting.plan.model_dump(mode="json"),
         "ego_route": list(setting.site.route.edges),
         "junction": setting.site.route.junction,
-        "sha256": dict(setting.checksums) | _traffic_checksum(setting.site),
+        "sha256": dict(setting.checksums) | traffic_checksum(setting.site),
         "versions": dict(setting.versions),
         "sumo_options": dict(OPTIONS),
     }
 
 
-def _traffic_checksum(site: Site) -> dict[str, str]:
+def traffic_checksum(site: Site) -> dict[str, str]:
     """The SHA-256 of the background traffic that was drawn, if any."""
     if site.demand is None:
         return {}

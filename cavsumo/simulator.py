@@ -79,7 +79,7 @@ class Performance:
         self._episode = Episode(Judgement(""))
         self._learners = any(type(a).process_feedback is not Agent.process_feedback for a in agents)
         _observe(stage, self._episode, self.snapshot, record)
-        self.over = _over(stage, self.snapshot)
+        self._end(_over(stage, self.snapshot))
 
     def step(self) -> Feedback | None:
         """One timestep: everybody chooses, the world moves on; what the agents earned by it.
@@ -93,7 +93,7 @@ class Performance:
         command = stage.ego.act(self.ego_view)
         successor = stage.world.step(states, command)
         if successor is None or (isinstance(command, Drive) and _at_end(scene, successor)):
-            self.over = True
+            self._end(True)
             rewards = self._ledger.lost()
             _feed_back(agents, views, actions, rewards, views)
             return rewards
@@ -106,12 +106,29 @@ class Performance:
         if self._learners:
             _feed_back(agents, views, actions, rewards, self.agent_views)
         self.snapshot = successor
-        self.over = _over(stage, successor)
+        self._end(_over(stage, successor))
         return rewards
 
+    @property
+    def contacts(self) -> ContactMonitor:
+        """Who touched whom so far."""
+        return self._episode.contacts
+
+    @property
+    def judgement(self) -> Judgement:
+        """The most serious of what the assertions say so far."""
+        return _worst(self._stage)
+
     def finished(self) -> Episode:
-        """What happened."""
+        """What happened, or what happened so far."""
         return _finished(self._stage, self._episode, self.snapshot, self._ledger)
+
+    def _end(self, over: bool) -> None:
+        """Note whether the episode is over; if so, the assertions are told."""
+        self.over = over
+        if over:
+            for assertion in self._stage.assertions:
+                assertion.conclude()
 
     def _show(self, snapshot: Snapshot) -> None:
         """Let everybody see a snapshot: all of it, unless there are sensors."""
@@ -274,10 +291,7 @@ def _at_end(scene: Scene, snapshot: Snapshot) -> bool:
 
 def _finished(stage: Stage, episode: Episode, snapshot: Snapshot, ledger: Ledger) -> Episode:
     """The episode with its totals."""
-    for assertion in stage.assertions:
-        assertion.conclude()
-    judgements = [a.judgement for a in stage.assertions]
-    episode.judgement = min(judgements, key=lambda j: SEVERITY.index(j.verdict))
+    episode.judgement = _worst(stage)
     episode.steps, episode.time = snapshot.step, snapshot.time
     episode.cost, episode.reward = ledger.cost, ledger.total
     world = stage.world
@@ -285,3 +299,9 @@ def _finished(stage: Stage, episode: Episode, snapshot: Snapshot, ledger: Ledger
     episode.teleports, episode.emergency_stops = world.teleports, world.emergency_stops
     assert math.isfinite(episode.reward)
     return episode
+
+
+def _worst(stage: Stage) -> Judgement:
+    """The most serious judgement."""
+    judgements = [a.judgement for a in stage.assertions]
+    return min(judgements, key=lambda j: SEVERITY.index(j.verdict))

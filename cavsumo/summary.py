@@ -63,7 +63,7 @@ def summarise(
 def _table(tally: Tally, sequential: bool) -> Table:
     """One line an agent."""
     table = Table(box=None, pad_edge=False, padding=(0, 2, 0, 0))
-    table.add_column("agent")
+    table.add_column("agent", overflow="fold")  # a path may be long
     for title in ("runs", "tests", "rate", "95 % interval", "failures", "of tests"):
         table.add_column(title, justify="right", no_wrap=True)
     for title in ("unfair", "errors", "median time"):
@@ -98,7 +98,7 @@ def _say_first(tally: Tally, csv_file: Path, console: Console) -> None:
             _say(
                 console,
                 f"first {what}: run {row['run']} ({row['agent']}): {event(row)}"
-                f"\n       cavsumo replay {csv_file} {row['run']}",
+                f"\n       cavsumo replay {csv_file} {row['run']} --html run{row['run']}.html",
             )
             return
 

@@ -25,7 +25,7 @@ from typing import Any
 from cavsumo.errors import BatchError, InputError
 from cavsumo.jobs import Job, failed
 from cavsumo.outcomes import Outcome, is_test
-from cavsumo.processes import OUTER_PATH, ending
+from cavsumo.processes import ending, inner_environment
 from cavsumo.scenario import Simulation
 from cavsumo.setting import Setting
 from cavsumo.worker_process import GOODBYE
@@ -140,11 +140,8 @@ class Worker:
         _limit(self._pipe)
         fds = theirs.fileno(), self._log.fileno()
         numbers = (*fds, os.getpid())
-        environment = os.environ | {
-            "PYTHONPATH": os.pathsep.join(sys.path),
-            OUTER_PATH: os.environ.get("PYTHONPATH", ""),
-            "TMPDIR": self._folder.name,  # what a killed process leaves goes with this folder
-        }
+        # what a killed process leaves goes with this folder
+        environment = inner_environment() | {"TMPDIR": self._folder.name}
         _WORKERS.add(self)
         try:
             self._process = subprocess.Popen(

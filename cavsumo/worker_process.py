@@ -28,7 +28,7 @@ def main(pipe_fd: int, log_fd: int, parent: int) -> None:
     leash(parent)()
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # the parent decides what Ctrl-C means
     signal.signal(signal.SIGALRM, signal.SIG_DFL)
-    _divert_output(log_fd)
+    divert_output(log_fd)
     pipe = Connection(pipe_fd)
     with contextlib.suppress(EOFError, ConnectionError):  # the parent is gone or has no more jobs
         _serve(pipe, *pipe.recv())
@@ -58,7 +58,7 @@ def _serve(pipe: Connection, setting: Setting, strict: bool) -> None:
         pipe.send(GOODBYE)
 
 
-def _divert_output(log_fd: int) -> None:
+def divert_output(log_fd: int) -> None:
     """Send what SUMO prints to a file; what Python prints goes to the real stderr."""
     sys.stdout = sys.stderr = os.fdopen(os.dup(2), "w", buffering=1)
     os.dup2(log_fd, 1)

@@ -17,11 +17,12 @@ import pytest
 from cavsumo.cli import main
 from cavsumo.errors import InputError
 from cavsumo.jobs import episode_seed
-from cavsumo.outcomes import COLUMNS, row_line, trace_text
+from cavsumo.outcomes import COLUMNS, row_line
 from cavsumo.report.analysis import Report, analyse
 from cavsumo.report.events import side_ahead, side_hit
 from cavsumo.report.formats import FORMATS
-from cavsumo.results import FORMAT, HEADER, read_moments, read_rows, read_trace
+from cavsumo.results import FORMAT, HEADER, read_rows
+from cavsumo.traces import read_moments, read_trace, trace_text
 
 Says = Callable[..., str]
 Row = dict[str, Any]
@@ -135,7 +136,7 @@ def test_what_the_traces_tell(real: Path) -> None:
     rows = report.evidence.rows
     for index, test in report.tests.items():
         row = rows.loc[index]
-        frames = read_trace(real.parent / row["trace"])
+        frames = read_trace(real.parent / row["trace"]).frames
         i = next(i for i, f in enumerate(frames) if f["time_s"] >= row["trigger_time_s"] - 1e-6)
         ego, tester = frames[i]["ego"], frames[i]["testers"][row["tester"]]
         way = [f["ego"][:2] for f in frames[: i + 1]]

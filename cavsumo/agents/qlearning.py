@@ -20,8 +20,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from cavsumo.agents.base import AGENTS, Agent
-from cavsumo.agents.features import FEATURES, TARGETS, Features
-from cavsumo.agents.walking import walk
+from cavsumo.agents.features import FEATURES, TARGETS, Features, towards
 from cavsumo.bodies import Action
 from cavsumo.checks import number, truth
 from cavsumo.scene import Scene
@@ -90,7 +89,10 @@ class QLearningAgent(Agent):
         if not self._decided:
             self._decided = [self._decide(i, snapshot) for i in range(len(self.owned))]
         return tuple(
-            self._towards(i, target, snapshot) for i, (target, _) in enumerate(self._decided)
+            towards(state, features.across, target, self.scene.dt)
+            for state, features, (target, _) in zip(
+                self.own(snapshot), self.features, self._decided, strict=True
+            )
         )
 
     def process_feedback(
@@ -137,13 +139,6 @@ class QLearningAgent(Agent):
         """The value of the best target for one body."""
         options = (self.features[i].values(snapshot, target) for target in range(len(TARGETS)))
         return max(self.q_value(f) for f in options)
-
-    def _towards(self, i: int, target: int, snapshot: Snapshot) -> Action:
-        """Throttle and steering towards a target."""
-        state = snapshot.testers[self.owned[i]]
-        moving, turn = TARGETS[target]
-        heading = self.features[i].across + turn if moving else state.o
-        return walk(state, heading, moving * state.body.kind.v_max, self.scene.dt)
 
 
 def load_weights(file: Path) -> list[float]:

@@ -80,7 +80,10 @@ class Assertion:
         raise NotImplementedError
 
     def conclude(self) -> None:
-        """The episode is over: what was judged once all is known is judged now."""
+        """The episode is over: the judgement is final, of what needed all of it, too.
+
+        ``decided`` stays as it is unless the ego broke the assertion only now.
+        """
 
 
 ASSERTIONS: Registry[Assertion] = Registry("assertion")

@@ -78,7 +78,6 @@ class CustomAssertion(Assertion):
             self._take_over("at the end")
         elif self.judgement.verdict == HELD:
             self.judgement = dataclasses.replace(self.judgement, robustness=self._margin)
-        self.decided, self.pending = True, False
 
     def _number(self, answer: Any, at: str) -> float:
         """What was answered, if it is a number."""

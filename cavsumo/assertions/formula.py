@@ -68,7 +68,6 @@ class FormulaAssertion(Assertion):
             self._judge(closed=True)
         elif self.judgement.triggered:
             self.judgement = dataclasses.replace(self.judgement, robustness=self._margin)
-        self.decided, self.pending = True, False
 
     # A timestep alone
 
@@ -91,8 +90,11 @@ class FormulaAssertion(Assertion):
         self._look_for_trigger(closed)
         if bounds.greatest[0] < 0.0:
             self._find_violation(float(bounds.greatest[0]))
-        elif closed or bounds.least[0] > 0.0:
-            self._hold(float(bounds.greatest[0] if closed else bounds.least[0]))
+        elif bounds.least[0] > 0.0 and not closed:  # nothing that follows can break it
+            self._hold(float(bounds.least[0]))
+            self.decided, self.pending = True, False
+        elif closed:
+            self._hold(float(bounds.greatest[0]))
         else:
             self.pending = self._open()
 
@@ -134,10 +136,9 @@ class FormulaAssertion(Assertion):
         self._violate(high - 1, found)
 
     def _hold(self, margin: float) -> None:
-        """Nothing that follows can break it."""
+        """Note the robustness of a formula that was not violated, if it was triggered."""
         if self.judgement.verdict == HELD:
             self.judgement = dataclasses.replace(self.judgement, robustness=margin)
-        self.decided, self.pending = True, False
 
     # Both
 

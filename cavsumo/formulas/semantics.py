@@ -105,16 +105,22 @@ def robustness(formula: TruthNode, view: View) -> Bounds:
 
     Raises NoNumber where arithmetic has no result, such as 0 / 0.
     """
+    with np.errstate(all="ignore"):
+        return _bounds(formula, view)
+
+
+def _bounds(formula: TruthNode, view: View) -> Bounds:
+    """``robustness`` without a guard around it."""
     match formula:
         case Constant(value=value):
             return _known(np.full(view.n, math.inf if value else -math.inf))
         case Comparison():
             return _known(_compared(formula, view))
         case Not(of=of):
-            return robustness(of, view).opposite
+            return _bounds(of, view).opposite
         case Junction(op=op, of=parts):
             join = np.minimum if op == "and" else np.maximum
-            least, greatest = zip(*(robustness(part, view) for part in parts), strict=True)
+            least, greatest = zip(*(_bounds(part, view) for part in parts), strict=True)
             return Bounds(reduce(join, least), reduce(join, greatest))
         case Conditional():
             return _conditional(formula, view)
@@ -141,7 +147,7 @@ def _known(values: Values) -> Bounds:
 
 
 def _conditional(node: Conditional, view: View) -> Bounds:
-    left, right = robustness(node.left, view), robustness(node.right, view)
+    left, right = _bounds(node.left, view), _bounds(node.right, view)
     onward = _either(left.opposite, right)
     if not node.both:
         return onward
@@ -160,19 +166,14 @@ def _either(a: Bounds, b: Bounds) -> Bounds:
 def _compared(node: Comparison, view: View) -> Values:
     """The robustness of a comparison, never 0."""
     a, b = _value(node.left, view), _value(node.right, view)
-    with np.errstate(invalid="ignore"):
-        apart = np.where(a == b, 0.0, a - b)  # infinite and equal, too
-    margin = {
-        ">": apart,
-        ">=": apart,
-        "<": -apart,
-        "<=": -apart,
-        "==": -np.abs(apart),
-        "!=": np.abs(apart),
-    }[node.op]
-    on_bound = TINY if node.op in (">=", "<=", "==") else -TINY
-    small = np.where(margin == 0.0, on_bound, np.copysign(TINY, margin))
-    return np.where(np.abs(margin) < TINY, small, margin)
+    margin = b - a if node.op in ("<", "<=") else a - b
+    if node.op in ("==", "!="):
+        margin = np.abs(margin) if node.op == "!=" else -np.abs(margin)
+    close = ~(np.abs(margin) >= TINY)  # that is 0, or no number: both infinite and equal
+    if close.any():
+        on_bound = TINY if node.op in (">=", "<=", "==") else -TINY
+        margin[close] = np.where(a == b, on_bound, np.copysign(TINY, margin))[close]
+    return margin
 
 
 def _value(node: NumberNode, view: View) -> Values:
@@ -200,16 +201,15 @@ def _function(name: str, of: list[Values]) -> Values:
 
 
 def _arithmetic(op: str, a: Values, b: Values) -> Values:
-    with np.errstate(all="ignore"):
-        match op:
-            case "+":
-                return a + b
-            case "-":
-                return a - b
-            case "*":
-                return a * b
-            case _:
-                return a / b
+    match op:
+        case "+":
+            return a + b
+        case "-":
+            return a - b
+        case "*":
+            return a * b
+        case _:
+            return a / b
 
 
 # Time
@@ -217,7 +217,7 @@ def _arithmetic(op: str, a: Values, b: Values) -> Values:
 
 def _temporal(node: Temporal, view: View) -> Bounds:
     """always and historically are not eventually not and not once not."""
-    of = robustness(node.of, view)
+    of = _bounds(node.of, view)
     dual = node.op in ("always", "historically")
     of = of.opposite if dual else of
     begin, end = (1, 1) if node.op == "next" else steps_of(node.within, view.dt)
@@ -243,7 +243,7 @@ def _until(node: Until, view: View) -> Bounds:
 
     The greatest robustness takes what follows the last timestep as true, the least as false.
     """
-    f, g = robustness(node.left, view), robustness(node.right, view)
+    f, g = _bounds(node.left, view), _bounds(node.right, view)
     begin, end = steps_of(node.within, view.dt)
     if node.past:
         mirrored = (

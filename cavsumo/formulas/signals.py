@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
+from typing import Any
 
 from cavsumo.geometry import gap, overlap
 from cavsumo.roads import Light
@@ -74,19 +75,19 @@ def _gap_all(moment: Moment) -> float:
 
 
 def _ttc(moment: Moment) -> float:
-    return _times(moment.now.ego, moment.now.testers)[0]
+    return _shortest_time(moment.now.ego, moment.now.testers)
 
 
 def _ttc_all(moment: Moment) -> float:
-    return _times(moment.now.ego, _everybody(moment.now))[0]
+    return _shortest_time(moment.now.ego, _everybody(moment.now))
 
 
 def _drac(moment: Moment) -> float:
-    return _times(moment.now.ego, moment.now.testers)[1]
+    return _hardest_braking(moment.now.ego, moment.now.testers)
 
 
 def _drac_all(moment: Moment) -> float:
-    return _times(moment.now.ego, _everybody(moment.now))[1]
+    return _hardest_braking(moment.now.ego, _everybody(moment.now))
 
 
 def _nearest_speed(moment: Moment) -> float:
@@ -188,23 +189,31 @@ def _touches(ego: BodyState, bodies: Iterable[BodyState]) -> float:
     return float(any(overlap(ego.box, body.box) for body in bodies))
 
 
-def _times(ego: BodyState, bodies: Iterable[BodyState]) -> tuple[float, float]:
-    """The shortest time to collision and the largest deceleration to avoid one [s, m/s2].
+def _shortest_time(ego: BodyState, bodies: Iterable[BodyState]) -> float:
+    """The shortest time to collision [s]."""
+    found = _of_boxes("ttc_boxes", ego, bodies)
+    return math.inf if found is None else float(found.min())
+
+
+def _hardest_braking(ego: BodyState, bodies: Iterable[BodyState]) -> float:
+    """The largest deceleration to avoid a collision [m/s2]."""
+    found = _of_boxes("drac_boxes", ego, bodies)
+    return 0.0 if found is None else float(found.max())
+
+
+def _of_boxes(metric: str, ego: BodyState, bodies: Iterable[BodyState]) -> Any:
+    """A metric of ``metrics.plane`` for the ego and each that it may meet; None for nobody.
 
     Boxes whose circumscribed circles never meet are not looked at closely.
     """
     meeting = [body for body in bodies if _circles_meet(ego, body)]
     if not meeting:
-        return math.inf, 0.0
-    import numpy as np
+        return None
+    from cavsumo.metrics import plane
 
-    from cavsumo.metrics.plane import drac_boxes, ttc_boxes
-
-    own, others = np.array(ego.box), np.array([body.box for body in meeting])
-    velocities = np.array([_velocity(body) for body in meeting])
-    times = ttc_boxes(own, _velocity(ego), others, velocities)
-    needed = drac_boxes(own, _velocity(ego), others, velocities)
-    return float(times.min()), float(needed.max())
+    velocities = [_velocity(body) for body in meeting]
+    boxes = [body.box for body in meeting]
+    return getattr(plane, metric)(ego.box, _velocity(ego), boxes, velocities)
 
 
 def _circles_meet(ego: BodyState, body: BodyState) -> bool:
