@@ -207,8 +207,22 @@ def _add_scenario(group: Any) -> None:
         help="what the ego meets at the first traffic light on its route when nothing hinders it: "
         "green, red, or any (default any)",
     )
-    add("--assert", dest="assertions", action="append", metavar="NAME", help="repeat for several")
+    add(
+        "--assert",
+        dest="assertions",
+        action="append",
+        metavar="NAME",
+        help="what the ego must keep: an assertion by name, module:function or a formula's name; "
+        "repeat for several",
+    )
     add("--assert-param", action="append", metavar="KEY=VALUE", help="a parameter of theirs")
+    add(
+        "--formula",
+        action="append",
+        metavar="NAME=TEXT",
+        help="temporal logic, such as 'apart=always (gap_m > 0.5)'; asserted unless --assert names "
+        "others",
+    )
 
 
 def _add_testers(group: Any) -> None:

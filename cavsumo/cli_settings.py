@@ -38,6 +38,8 @@ def settings_of(options: argparse.Namespace) -> dict[str, Any]:
             raise InputError(f"--ego-route: expected edges, got {options.ego_route!r}")
     given["additional"] = options.additional_files and options.additional_files.split(",")
     settings = {key: value for key, value in given.items() if value is not None}
+    if options.formula:
+        settings["formulas"] = dict(_formula(word) for word in options.formula)
     for key, words in (
         ("params", options.param),
         ("ego_params", options.ego_param),
@@ -48,6 +50,14 @@ def settings_of(options: argparse.Namespace) -> dict[str, Any]:
         if words:
             settings[key] = dict(assignment(key, w) for w in words)
     return settings
+
+
+def _formula(word: str) -> tuple[str, str]:
+    """NAME=TEXT as two."""
+    name, equals, text = word.partition("=")
+    if not (equals and text.strip()):
+        raise InputError(f"--formula: expected NAME=TEXT, got {word!r}")
+    return name.strip(), text.strip()
 
 
 def assignment(option: str, word: str) -> tuple[str, bool | int | float | str]:

@@ -8,6 +8,7 @@
     |   `-- NetworkError        a network that cannot serve the test asked for
     |-- NoSuchAction            no action leads from one state to another (seed, eq. 22)
     |-- EgoError                the ego's controller raised or gave an answer that is none
+    |-- AssertionFault          a user's assertion raised or gave a judgement that is none
     |-- AgentError              a tester agent raised or chose an action outside its space
     |-- SimulationError         SUMO refused a call, or the ego never entered the network
     |   `-- SimulationTaken     another world took the one simulation of this process
@@ -60,6 +61,10 @@ class NoSuchAction(CavsumoError, ValueError):
 
 class EgoError(CavsumoError):
     """The ego's controller raised, or gave an answer that is none."""
+
+
+class AssertionFault(CavsumoError):
+    """A user's assertion or formula raised, or gave a judgement that is none."""
 
 
 class AgentError(CavsumoError):

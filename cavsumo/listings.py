@@ -28,7 +28,9 @@ def listing(sort: str, name: str | None) -> str:
         return "\n".join(_columns({**lines, **_forms(sort)}))
     if sort == "egos":
         registry = _registry_of(name, registry)
-    name = name.partition(":")[0]
+        name = name.partition(":")[0]
+    elif sort == "assertions":
+        registry = _with_own(name)
     shown = {
         f"{p.name}={p.default}": p.doc
         for p in registry.parameters(name)
@@ -47,10 +49,19 @@ def _columns(lines: Mapping[str, str]) -> list[str]:
 
 def _forms(sort: str) -> Mapping[str, str]:
     """How one from the user is named."""
-    from cavsumo.egos.specs import FORMS
+    from cavsumo.assertions import specs as assertions
+    from cavsumo.egos import specs as egos
 
     policies = {"policy:FILE": "a tester that you trained, in a policy file (.npz)"}
-    return {"egos": FORMS, "agents": policies}.get(sort, {})
+    forms = {"egos": egos.FORMS, "assertions": assertions.FORMS, "agents": policies}
+    return forms.get(sort, {})
+
+
+def _with_own(assertion: str) -> Registry[Any]:
+    """The assertions, with the user's own if it is one."""
+    from cavsumo.assertions.specs import registry_of
+
+    return registry_of([assertion], {})
 
 
 def _registry_of(ego: str, registered: Registry[Any]) -> Registry[Any]:

@@ -18,6 +18,7 @@ from pydantic import (
     ValidationError,
     ValidationInfo,
     field_validator,
+    model_validator,
 )
 
 from cavsumo.checks import densities
@@ -84,9 +85,23 @@ class Scenario(BaseModel):
     end: Finite = Field(60.0, gt=0, le=36000, description="horizon of an episode [s]")
     step_length: Finite = Field(0.1, ge=0.001, le=1, description="timestep lambda [s]")
     assertions: tuple[str, ...] = Field(
-        ("reaction-zone",), min_length=1, description="what the ego must keep"
+        ("reaction-zone",),
+        min_length=1,
+        description="what the ego must keep: registered assertions, module:function, formulas; all "
+        "formulas if only those are given",
     )
     assertion_params: Params = Field(default_factory=dict, description="their parameters")
+    formulas: dict[str, str] = Field(
+        default_factory=dict, description="temporal-logic formulas by name (docs/formulas.md)"
+    )
+
+    @model_validator(mode="before")
+    @classmethod
+    def _formulas_are_asserted(cls, given: Any) -> Any:
+        """Formulas without a list of assertions are what is asserted."""
+        if isinstance(given, Mapping) and given.get("formulas") and "assertions" not in given:
+            return {**given, "assertions": tuple(given["formulas"])}
+        return given
 
     @field_validator("step_length")
     @classmethod

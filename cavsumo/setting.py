@@ -17,6 +17,7 @@ import numpy as np
 from cavsumo import __version__
 from cavsumo.agents.manoeuvres import types_for
 from cavsumo.assertions import make_assertions
+from cavsumo.assertions.specs import assertion_files
 from cavsumo.bodies import WALKING, Kind, kind_named
 from cavsumo.demand import BEYOND_S
 from cavsumo.egos import make_ego
@@ -73,7 +74,9 @@ def prepare(plan: BatchPlan, ego: Ego | None = None) -> Setting:
     """
     scenario = plan.scenario
     check_agents(plan)
-    make_assertions(scenario.assertions, scenario.assertion_params)
+    make_assertions(
+        scenario.assertions, scenario.assertion_params, scenario.formulas, scenario.step_length
+    )
     kind = kind_named(scenario.kind)
     _check_kind(plan, kind)
     if learners(plan) and (plan.shard or plan.reset == "shared"):
@@ -147,11 +150,12 @@ def _types(plan: BatchPlan) -> tuple[str, ...]:
 
 
 def checksums(plan: BatchPlan) -> dict[str, str]:
-    """The SHA-256 of every file that a plan names, its ego's among them."""
+    """The SHA-256 of every file that a plan names, those of its ego and assertions among them."""
     scenario = plan.scenario
     files = [scenario.net, *([scenario.routes] if scenario.routes else []), *scenario.additional]
-    files += policy_files(plan)
-    return {str(file): checksum(file) for file in (*files, *ego_files(scenario.ego))}
+    files += [*policy_files(plan), *ego_files(scenario.ego)]
+    files += assertion_files(scenario.assertions)
+    return {str(file): checksum(file) for file in files}
 
 
 def checksum(file: Path) -> str:

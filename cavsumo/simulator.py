@@ -97,7 +97,7 @@ class Performance:
         self._history: list[Snapshot] = []  # what the blame is found from
         self._learners = any(type(a).process_feedback is not Agent.process_feedback for a in agents)
         self._observe(self.snapshot)
-        self.over = _over(stage, self.snapshot)
+        self._end(_over(stage, self.snapshot))
 
     def step(self) -> Feedback | None:
         """One timestep: everybody chooses, the world moves on; what the agents earned by it.
@@ -111,7 +111,7 @@ class Performance:
         command = stage.ego.act(self.ego_view)
         successor = stage.world.step(states, command)
         if successor is None or (isinstance(command, Drive) and _at_end(scene, successor)):
-            self.over = True
+            self._end(True)
             rewards = self._ledger.lost()
             _feed_back(agents, views, actions, rewards, views)
             return rewards
@@ -125,7 +125,7 @@ class Performance:
         if self._learners:
             _feed_back(agents, views, actions, rewards, self.agent_views)
         self.snapshot = successor
-        self.over = _over(stage, successor)
+        self._end(_over(stage, successor))
         return rewards
 
     @property
@@ -169,6 +169,13 @@ class Performance:
         self._history.append(snapshot)
         if self._record:
             episode.frames.append(snapshot)
+
+    def _end(self, over: bool) -> None:
+        """Note whether the episode is over; if so, the assertions are told."""
+        self.over = over
+        if over:
+            for assertion in self._stage.assertions:
+                assertion.conclude()
 
     def _show(self, snapshot: Snapshot) -> None:
         """Let everybody see a snapshot: all of it, unless there are sensors."""

@@ -60,7 +60,12 @@ def set_stage(scenario: Scenario, site: Site, ego: Ego | None = None) -> Stage:
         world=World(scenario, site, ego),
         site=site,
         ego=ego,
-        assertions=make_assertions(scenario.assertions, scenario.assertion_params),
+        assertions=make_assertions(
+            scenario.assertions,
+            scenario.assertion_params,
+            scenario.formulas,
+            scenario.step_length,
+        ),
         teams=teams(scenario),
         bodies=tester_bodies(scenario),
         horizon=scenario.end,

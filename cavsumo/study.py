@@ -28,7 +28,7 @@ from cavsumo.errors import InputError
 from cavsumo.scenario import SENSOR_KEYS
 
 # Settings that add up, key by key.
-TABLES = ("params", "ego_params", "assertion_params", *SENSOR_KEYS)
+TABLES = ("params", "ego_params", "assertion_params", "formulas", *SENSOR_KEYS)
 NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9._-]*")
 MOST, LONGEST = 1000, 100  # batches of a study; characters of a batch's name
 

@@ -10,7 +10,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from cavsumo.agents.base import Agent
-from cavsumo.assertions import make_assertions
 from cavsumo.assertions.base import Judgement
 from cavsumo.bodies import Action, Kind, clamped
 from cavsumo.egos.base import Acceleration, Command, Drive, Ego
@@ -103,10 +102,15 @@ class Stage:
             **{f.name: getattr(self.site, f.name) for f in dataclasses.fields(Site)},
             places=tuple(places),
         )
-        settings = {"testers": len(places), "assertions": names, "kind": kind, "end": end}
+        settings = {
+            "testers": len(places),
+            "assertions": names,
+            "assertion_params": params,
+            "kind": kind,
+            "end": end,
+        }
         scenario = self.plan.scenario.model_copy(update=settings)
         stage = set_stage(scenario, site, Scripted(ego, start, decel))
-        stage = dataclasses.replace(stage, assertions=make_assertions(names, dict(params)))
         agents = [Puppet(testers) for _ in stage.teams]
         try:
             episode = play(stage, agents, 1)

@@ -16,8 +16,8 @@ PACKAGE = Path(cavsumo.__file__).parent
 
 # From the ground up: a module uses only what stands before it, lazily or not.
 ORDER = """
-    cavsumo errors checks registry processes kinematics geometry paths bodies snapshot fairness
-    roads sumo_poses background
+    cavsumo errors checks registry imports processes kinematics geometry paths bodies snapshot
+    fairness roads sumo_poses background
     metrics.following metrics.rss metrics.highway_code metrics.zones metrics.plane
     metrics.encroachment metrics
     network ego_routes lane_chains approaches starts vehicle_starts kerbs signals trips traffic
@@ -28,11 +28,14 @@ ORDER = """
     observations policies agents.policy
     ego_observations
     contacts conduct criticality
+    formulas.nodes formulas.words formulas.syntax formulas.windows formulas.semantics
+    formulas.signals formulas.rules formulas
     assertions.base assertions.room assertions.collision assertions.reaction_zone
     assertions.margin assertions.relations assertions.stopping_distance assertions.two_second_gap
     assertions.speed_limit assertions.leaving_the_road assertions.red_light assertions.give_way
     assertions.reasons assertions.standing assertions.hard_braking assertions.rss
-    assertions.criticality assertions validity blame
+    assertions.criticality assertions.formula assertions.custom assertions.specs assertions
+    validity blame
     egos.base egos.constant egos.sumo egos.time_gap egos.effectors egos.controller
     egos.protocol egos.link egos.child egos.wire egos.external egos.specs egos
     options labels scenario config study outcomes rewards ego_rewards

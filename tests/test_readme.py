@@ -32,11 +32,12 @@ def checkout(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("checkout")
     for name in ("networks", "routes", "examples"):
         (folder / name).symlink_to(ROOT / name)
-    example = re.search(r"<!-- example: (\S+) -->\n```python\n(.*?)```", README, re.DOTALL)
+    examples = re.findall(r"<!-- example: (\S+) -->\n```python\n(.*?)```", README, re.DOTALL)
     scenarios = re.findall(r"```toml\n(# (\S+):.*?)```", README, re.DOTALL)
-    assert example
+    assert examples
     assert len(scenarios) == 2
-    (folder / example[1]).write_text(example[2], encoding="utf-8")
+    for name, source in examples:
+        (folder / name).write_text(source, encoding="utf-8")
     for text, name in scenarios:
         (folder / name).write_text(text, encoding="utf-8")
     (folder / "my.net.xml").symlink_to(ROOT / "networks" / "pedestrians.net.xml")

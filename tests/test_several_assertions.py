@@ -23,18 +23,18 @@ NAMES = ("reaction-zone", "stopping-distance", "speed-limit")
 def test_parameters_are_shared_or_of_one() -> None:
     """KEY for all that have it, NAME.KEY for one; what none has is refused."""
     made = make_assertions(
-        ("stopping-distance", "two-second-gap", "rss"), {"wet": True, "rss.rho": 0.5}
+        ("stopping-distance", "two-second-gap", "rss"), {"wet": True, "rss.rho": 0.5}, {}, 0.1
     )
     stopping, gap, rss = (vars(a) for a in made)
     assert (stopping["factor"], gap["gap_s"], rss["rho"]) == (2.0, 4.0, 0.5)
     with pytest.raises(UnknownName, match=r"'roh'.*did you mean 'rho'"):
-        make_assertions(("rss", "ttc"), {"roh": 1.0})
+        make_assertions(("rss", "ttc"), {"roh": 1.0}, {}, 0.1)
     with pytest.raises(UnknownName, match=r"'rss\.roh'.*did you mean 'rss\.rho'"):
-        make_assertions(("rss", "ttc"), {"rss.roh": 1.0})
+        make_assertions(("rss", "ttc"), {"rss.roh": 1.0}, {}, 0.1)
     with pytest.raises(UnknownName):
-        make_assertions(("ttc",), {"rss.rho": 1.0})
+        make_assertions(("ttc",), {"rss.rho": 1.0}, {}, 0.1)
     with pytest.raises(InputError, match="'ttc' is named twice"):
-        make_assertions(("ttc", "rss", "ttc"), {})
+        make_assertions(("ttc", "rss", "ttc"), {}, {}, 0.1)
 
 
 def test_the_scenario_file_sets_them_alike(tmp_path: Path, networks: dict[str, Path]) -> None:
@@ -49,7 +49,7 @@ def test_the_scenario_file_sets_them_alike(tmp_path: Path, networks: dict[str, P
 
 def verdict_of(**verdicts: str) -> Judgement:
     """What stands for an episode in which assertions said this."""
-    made = make_assertions([name.replace("_", "-") for name in verdicts], {})
+    made = make_assertions([name.replace("_", "-") for name in verdicts], {}, {}, 0.1)
     for i, (assertion, verdict) in enumerate(zip(made, verdicts.values(), strict=True)):
         when = None if verdict == NOT_TRIGGERED else 5.0 - i
         assertion.judgement = Judgement(assertion.name, verdict, trigger_time=when)

@@ -17,6 +17,7 @@ from cavsumo.assertions import (  # noqa: F401  (imported to be registered)
     stopping_distance,
     two_second_gap,
 )
-from cavsumo.assertions.base import ASSERTIONS, Assertion, Judgement, make_assertions
+from cavsumo.assertions.base import ASSERTIONS, Assertion, Judgement
+from cavsumo.assertions.specs import make_assertions
 
 __all__ = ["ASSERTIONS", "Assertion", "Judgement", "make_assertions"]

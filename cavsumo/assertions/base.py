@@ -5,10 +5,9 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, ClassVar
+from typing import ClassVar
 
 from cavsumo.contacts import Contact
-from cavsumo.errors import InputError
 from cavsumo.registry import Registry
 from cavsumo.scene import Scene
 from cavsumo.snapshot import Snapshot
@@ -69,7 +68,7 @@ class Assertion:
 
     PARAMETERS: ClassVar[Mapping[str, str]] = {}
     sees_background: bool = True
-    unconditional: ClassVar[bool] = False
+    unconditional: bool = False
     unit: ClassVar[str] = ""
     name: ClassVar[str]
 
@@ -86,6 +85,12 @@ class Assertion:
     def observe(self, snapshot: Snapshot, contacts: Sequence[Contact]) -> None:
         """Take in a snapshot and the contacts that begin in it."""
         raise NotImplementedError
+
+    def conclude(self) -> None:
+        """The episode is over: the judgement is final, of what needed all of it, too.
+
+        ``decided`` stays as it is unless the ego broke the assertion only now.
+        """
 
 
 def weightiest(assertions: Sequence[Assertion]) -> Judgement:
@@ -110,12 +115,3 @@ def _weight(said: Judgement) -> tuple[int, float]:
 
 
 ASSERTIONS: Registry[Assertion] = Registry("assertion")
-
-
-def make_assertions(names: Sequence[str], params: Mapping[str, Any]) -> tuple[Assertion, ...]:
-    """The assertions named, each with the parameters meant for it (``Registry.shared``)."""
-    twice = sorted({name for name in names if names.count(name) > 1})
-    if twice:
-        raise InputError(f"assertion {twice[0]!r} is named twice")
-    given = ASSERTIONS.shared(names, params)
-    return tuple(ASSERTIONS.make(name, given[name]) for name in names)

@@ -6,16 +6,14 @@ The class is built with the ego's parameters as keywords. It has ``act(snapshot)
 
 from __future__ import annotations
 
-import importlib
-import sys
 from collections.abc import Callable, Mapping
-from pathlib import Path
 from typing import Any
 
 from cavsumo.bodies import Kind
 from cavsumo.egos.base import EGO_KIND, Command, Ego
 from cavsumo.egos.effectors import checked, within
-from cavsumo.errors import EgoError, InputError, UnknownName
+from cavsumo.errors import EgoError, InputError
+from cavsumo.imports import imported, said
 from cavsumo.scene import Scene
 from cavsumo.snapshot import Snapshot
 
@@ -28,7 +26,7 @@ class ControllerEgo(Ego):
         try:
             self.controller = factory(**params)
         except Exception as error:
-            raise InputError(f"ego {spec}: cannot be built: {_said(error)}") from error
+            raise InputError(f"ego {spec}: cannot be built: {said(error)}") from error
         if not callable(getattr(self.controller, "act", None)):
             raise InputError(f"ego {spec}: has no method act(snapshot)")
         self.kind = getattr(self.controller, "kind", EGO_KIND)
@@ -46,14 +44,14 @@ class ControllerEgo(Ego):
             if hasattr(self.controller, "reset"):
                 self.controller.reset(scene)
         except Exception as error:
-            raise EgoError(f"ego {self.spec}: reset raised {_said(error)}") from error
+            raise EgoError(f"ego {self.spec}: reset raised {said(error)}") from error
 
     def act(self, snapshot: Snapshot) -> Command:
         at = f"ego {self.spec} at {snapshot.time:.2f} s"
         try:
             command = self.controller.act(snapshot)
         except Exception as error:
-            raise EgoError(f"{at}: act raised {_said(error)}") from error
+            raise EgoError(f"{at}: act raised {said(error)}") from error
         try:
             checked(command, self._sort, self.kind)
         except EgoError as error:
@@ -64,23 +62,4 @@ class ControllerEgo(Ego):
 
 def controller_class(spec: str) -> Callable[..., Any]:
     """Import ``module:Class``, the working folder included."""
-    module_name, _, class_name = spec.partition(":")
-    here = str(Path.cwd())
-    if here not in sys.path:
-        sys.path.insert(0, here)
-    try:
-        module = importlib.import_module(module_name)
-    except ModuleNotFoundError as error:
-        raise InputError(f"ego {spec}: no module named {error.name!r}") from error
-    except Exception as error:
-        raise InputError(f"ego {spec}: importing {module_name} raised {_said(error)}") from error
-    if not callable(getattr(module, class_name, None)):
-        names = [n for n, v in vars(module).items() if isinstance(v, type)]
-        raise UnknownName(f"class in module {module_name}", class_name, names, f"ego {spec}")
-    factory: Callable[..., Any] = getattr(module, class_name)
-    return factory
-
-
-def _said(error: BaseException) -> str:
-    """An exception as one line."""
-    return " ".join(f"{type(error).__name__}: {error}".split())
+    return imported(spec, f"ego {spec}", "class")

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Mapping
 from functools import partial
 from pathlib import Path
@@ -11,6 +10,7 @@ from typing import Any
 from cavsumo.egos.base import EGOS, Ego
 from cavsumo.egos.controller import ControllerEgo, controller_class
 from cavsumo.egos.external import EXTERNAL, command_words
+from cavsumo.imports import source_file
 from cavsumo.registry import Registry
 
 # What an ego may be called besides a registered name, for listings.
@@ -42,11 +42,5 @@ def ego_files(spec: str) -> tuple[Path, ...]:
         words = dict.fromkeys(command_words(address))
         return tuple(file for file in map(Path, words) if file.is_file())
     controller_class(spec)
-    source = getattr(sys.modules[sort], "__file__", None)
-    return (_relative(Path(source)),) if source else ()
-
-
-def _relative(file: Path) -> Path:
-    """A file relative to the working folder, if it lies there."""
-    here = Path.cwd()
-    return file.relative_to(here) if file.is_relative_to(here) else file
+    source = source_file(spec)
+    return (source,) if source else ()

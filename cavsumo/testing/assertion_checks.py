@@ -45,7 +45,7 @@ def encounter(ground: Ground, seed: int, others: Others = nobody) -> tuple[Scene
 
 
 def judged(assertion: Assertion, scene: Scene, frames: list[Frame]) -> Iterator[Judgement]:
-    """What an assertion says after each snapshot, each of it checked."""
+    """What an assertion says after each snapshot and at the end, each of it checked."""
     assertion.reset(scene)
     final: Judgement | None = None
     for snapshot, contacts in frames:
@@ -55,6 +55,10 @@ def judged(assertion: Assertion, scene: Scene, frames: list[Frame]) -> Iterator[
         assert final is None or said == final, f"{at}: changed what was decided to {said}"
         final = said if assertion.decided else None
         yield said
+    assertion.conclude()
+    check_judgement(assertion, assertion.judgement, frames[-1][0].time, "at the end")
+    assert final in (None, assertion.judgement), f"at the end: changed what was decided, {final}"
+    yield assertion.judgement
 
 
 def check_judgement(assertion: Assertion, said: Judgement, now: float, at: str) -> None:

@@ -1,0 +1,53 @@
+"""Things of the user's, named ``module:attribute``: importing them, and the files they stand in."""
+
+from __future__ import annotations
+
+import importlib
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+from cavsumo.errors import InputError, UnknownName
+
+
+def imported(spec: str, what: str, noun: str, *, functions: bool = False) -> Callable[..., Any]:
+    """Import ``module:attribute``, the working folder included.
+
+    Raises InputError for a module that cannot be imported, UnknownName for an attribute that it
+    has not or that cannot be called; ``what`` begins the message, ``noun`` is what the attribute
+    should be, and functions are among the names suggested if it may be one.
+    """
+    module_name, _, name = spec.partition(":")
+    here = str(Path.cwd())
+    if here not in sys.path:
+        sys.path.insert(0, here)
+    try:
+        module = importlib.import_module(module_name)
+    except ModuleNotFoundError as error:
+        raise InputError(f"{what}: no module named {error.name!r}") from error
+    except Exception as error:
+        raise InputError(f"{what}: importing {module_name} raised {said(error)}") from error
+    if not callable(getattr(module, name, None)):
+        names = [
+            n
+            for n, value in vars(module).items()
+            if isinstance(value, type) or (functions and callable(value))
+        ]
+        raise UnknownName(f"{noun} in module {module_name}", name, names, what)
+    found: Callable[..., Any] = getattr(module, name)
+    return found
+
+
+def source_file(spec: str) -> Path | None:
+    """The file of an imported module, relative to the working folder if it lies there."""
+    source = getattr(sys.modules[spec.partition(":")[0]], "__file__", None)
+    if source is None:
+        return None
+    file, here = Path(source), Path.cwd()
+    return file.relative_to(here) if file.is_relative_to(here) else file
+
+
+def said(error: BaseException) -> str:
+    """An exception as one line."""
+    return " ".join(f"{type(error).__name__}: {error}".split())
