@@ -18,6 +18,8 @@ PACKAGE = Path(cavsumo.__file__).parent
 ORDER = """
     cavsumo errors checks registry processes kinematics geometry paths bodies snapshot fairness
     roads sumo_poses background
+    metrics.following metrics.rss metrics.highway_code metrics.zones metrics.plane
+    metrics.encroachment metrics
     network ego_routes lane_chains approaches starts vehicle_starts kerbs signals trips traffic
     site scene sight sensors
     osm handedness netconvert facts surfaces inspection layers picture
