@@ -204,6 +204,12 @@ def _add_scenario(group: Any) -> None:
     )
     add("--assert", dest="assertions", action="append", metavar="NAME", help="repeat for several")
     add("--assert-param", action="append", metavar="KEY=VALUE", help="a parameter of theirs")
+    add(
+        "--reference",
+        choices=("none", "ideal", "human", "rss"),
+        help="the driver who takes over to see whether a violation was avoidable (default human: "
+        "careful and competent, UN R157); none to leave it out",
+    )
 
 
 def _add_testers(group: Any) -> None:
