@@ -8,6 +8,7 @@ from rich.console import Console
 from rich.table import Table
 
 from cavsumo.outcomes import cell, is_failure
+from cavsumo.references import REFERENCES
 from cavsumo.statistics import Rate
 from cavsumo.tally import Found, Row, Tally
 
@@ -44,6 +45,8 @@ def summarise(
         f"\n{together.tests} tests in {tally.rows} episodes, {together.failures} of them failed "
         f"by the ego.  {files}",
     )
+    if together.failures:
+        _say_preventable(tally, console)
     error = tally.first.get("error")
     if error:
         _say(
@@ -88,6 +91,22 @@ def _cells(found: Found, sequential: bool) -> list[str]:
         str(found.errors),
         "" if median is None else f"{median:.1f} s",
     ]
+
+
+def _say_preventable(tally: Tally, console: Console) -> None:
+    """How many failures the reference driver would have avoided, if that was asked."""
+    reference = str(tally.first["failure"].get("reference") or "")
+    if reference not in REFERENCES:
+        return
+    together = tally.all
+    left = together.failures - together.preventable.total()
+    words = REFERENCES.make(reference, {}).words
+    _say(
+        console,
+        f"{together.failures} failure{'s' * (together.failures > 1)}, "
+        f"{together.preventable[True]} of them preventable by {words}"
+        + (f", {left} not judged" if left else ""),
+    )
 
 
 def _say_first(tally: Tally, csv_file: Path, console: Console) -> None:

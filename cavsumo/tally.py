@@ -23,11 +23,13 @@ class Found:
         outcomes: how often each outcome came out.
         fresh: how many rows are of episodes in a simulation of their own.
         times: when tests were triggered, by time [s] to three decimals.
+        preventable: failures that the reference driver would have avoided (True) or not (False).
     """
 
     outcomes: Counter[str] = field(default_factory=Counter)
     fresh: int = 0
     times: Counter[float] = field(default_factory=Counter)
+    preventable: Counter[bool] = field(default_factory=Counter)
 
     @property
     def episodes(self) -> int:
@@ -98,6 +100,8 @@ class Tally:
             self.first.setdefault("test", row)
         if is_failure(row):
             self.first.setdefault("failure", row)
+            if cell(row.get("avoidable")):
+                found.preventable[cell(row["avoidable"]) == "1"] += 1
         if row["outcome"] == "error":
             self.first.setdefault("error", row)
 
@@ -108,6 +112,7 @@ class Tally:
         for found in self.agents.values():
             together.outcomes.update(found.outcomes)
             together.fresh += found.fresh
+            together.preventable.update(found.preventable)
         return together
 
 

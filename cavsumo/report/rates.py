@@ -42,6 +42,7 @@ class Rates(Told):
     Attributes:
         episodes, errors: how many there are, how many could not be played.
         tests, failures, unfair: of valid episodes, of tests, of valid episodes.
+        preventable: failures that the reference driver would have avoided, of those judged.
     """
 
     episodes: int
@@ -49,12 +50,14 @@ class Rates(Told):
     tests: Share
     failures: Share
     unfair: Share
+    preventable: Share
 
 
 def rates(group: Group) -> Rates:
     """The shares of one group."""
     found = Found(Counter(group.rows["outcome"]))
     sequential = group.sequential
+    judged = group.rows["avoidable"].dropna()
     return Rates(
         *group.whose,
         episodes=found.episodes,
@@ -62,6 +65,9 @@ def rates(group: Group) -> Rates:
         tests=share(found.tests, found.valid, "valid episodes", sequential=sequential),
         failures=share(found.failures, found.tests, "tests", sequential=sequential),
         unfair=share(found.unfair, found.valid, "valid episodes", sequential=sequential),
+        preventable=share(
+            int((judged == 1).sum()), len(judged), "judged failures", sequential=sequential
+        ),
     )
 
 
