@@ -62,6 +62,15 @@ def add_report(commands: Any) -> None:
     )
     add("-o", "--output", type=Path, metavar="FILE", help="write it there instead of printing it")
     add("--junit", type=Path, metavar="FILE", help="also write JUnit XML")
+    add("--html", type=Path, metavar="FILE", help="also write it as one page for the browser")
+    add(
+        "--replays",
+        type=int,
+        default=20,
+        metavar="N",
+        help="of --html: so many failures, and half as many passed tests, as pages that play "
+        "them, in a folder beside it (default 20)",
+    )
     report.set_defaults(command=_report)
 
 
@@ -88,9 +97,10 @@ def _replay(options: argparse.Namespace) -> int:
 
 
 def _report(options: argparse.Namespace) -> int:
-    from cavsumo.commands.report import report
+    from cavsumo.commands.report import Wanted, report
 
-    return report(options.results, options.by, options.format, options.output, options.junit)
+    names = [field.name for field in dataclasses.fields(Wanted)]
+    return report(options.results, Wanted(**{name: getattr(options, name) for name in names}))
 
 
 def _merge(options: argparse.Namespace) -> int:

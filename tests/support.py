@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shutil
 import time
 from collections.abc import Callable
 from concurrent.futures import Executor, Future
@@ -12,6 +13,12 @@ from cavsumo.results import read_rows
 from cavsumo.setting import Setting
 
 PATIENCE_S = 60.0
+CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser")
+OPTIONS = (
+    "--headless --no-sandbox --disable-gpu --disable-quic --no-first-run "
+    "--disable-background-networking --disable-component-update --disable-sync"
+).split()
+LAPTOP, PHONE = {"width": 1280, "height": 800}, {"width": 390, "height": 844}
 # Settings of a short environment on the straight road.
 STRAIGHT_NET = str(Path(__file__).parents[1] / "networks" / "pedestrians.net.xml")
 SHORT = {"net": STRAIGHT_NET, "routes": "none", "end": 6.0}

@@ -39,10 +39,12 @@ ORDER = """
     envs.elsewhere envs.painting envs.base envs.tester envs.ego envs.parallel envs.discrete envs
     statistics tally stopping results recorder learning progress session
     summary interrupts replays listings fcd gui
-    player.packing player.curves player.scenery player.facts player.page player
+    pages.shell pages player.packing player.curves player.scenery player.facts player.page player
     report report.load report.grouping report.rates report.pairs report.compare report.survival
     report.effort report.events report.distinct report.analysis report.tables report.figures
     report.formats report.junit
+    report.page.scenes report.page.words report.page.plots report.page.places report.page.links
+    report.page.document report.page
     testing.scripts testing.ego_checks testing.agent_checks testing.assertion_checks testing
     commands commands.run commands.replay commands.merge commands.report commands.inspect
     commands.import_osm commands.check_ego

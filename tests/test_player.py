@@ -18,7 +18,7 @@ from cavsumo.errors import InputError
 from cavsumo.player.curves import moment, time_to_collision
 from cavsumo.player.facts import marks, verdict
 from cavsumo.player.packing import columns, packed, shapes, unpacked
-from cavsumo.player.page import FILES, episode, page, write_page
+from cavsumo.player.page import episode, page, write_page
 from cavsumo.replays import Record
 from cavsumo.site import Site
 from cavsumo.traces import Shape, Trace
@@ -175,6 +175,7 @@ def test_a_wheel_has_the_players_files(tmp_path: Path) -> None:
     )  # fmt: skip
     assert done.returncode == 0, done.stderr
     names = zipfile.ZipFile(next(tmp_path.glob("*.whl"))).namelist()
-    for file in ("page.html.j2", "player.css", "player.js"):
-        assert f"cavsumo/player/{file}" in names
-        assert (FILES / file).is_file()
+    templates = ["pages/shell.html.j2", "player/player.html.j2", "report/page/report.html.j2"]
+    for file in [*templates, *(f"{name.split('.')[0]}.css" for name in templates)]:
+        assert f"cavsumo/{file}" in names
+        assert (ROOT / "cavsumo" / file).is_file()

@@ -5,12 +5,12 @@ from __future__ import annotations
 import dataclasses
 import json
 import math
-import shutil
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import pytest
+from support import PHONE
 
 from cavsumo.geometry import Box, zone_polygons
 from cavsumo.player.curves import moment
@@ -20,26 +20,8 @@ from cavsumo.replays import Record
 from cavsumo.site import Site
 from cavsumo.traces import Trace, parsed, states, trace_text
 
-CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser")
-OPTIONS = (
-    "--headless --no-sandbox --disable-gpu --disable-quic --no-first-run "
-    "--disable-background-networking --disable-component-update --disable-sync"
-).split()
-LAPTOP, PHONE = {"width": 1280, "height": 800}, {"width": 390, "height": 844}
 Shown = tuple[Record, Trace, Site]
 Opened = Callable[..., Any]
-
-
-@pytest.fixture(scope="module")
-def browser() -> Iterator[Any]:
-    """Chromium as Debian has it, driven by playwright."""
-    if CHROMIUM is None:
-        pytest.skip("no chromium here: apt-get install chromium")
-    api = pytest.importorskip("playwright.sync_api", reason="no playwright: pip install playwright")
-    with api.sync_playwright() as playwright:
-        running = playwright.chromium.launch(executable_path=CHROMIUM, args=OPTIONS)
-        yield running
-        running.close()
 
 
 @pytest.fixture(scope="module")
@@ -51,30 +33,9 @@ def file(shown: Shown, tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.fixture
-def opened(browser: Any, file: Path) -> Iterator[Opened]:
-    """Call with a viewport and such for the page; whatever it complains about fails the test."""
-    complaints: list[str] = []
-    requests: list[str] = []
-    contexts: list[Any] = []
-
-    def opened(which: Path = file, viewport: dict[str, int] = LAPTOP, **how: Any) -> Any:
-        context = browser.new_context(viewport=viewport, **how)
-        contexts.append(context)
-        page = context.new_page()
-        page.set_default_timeout(20_000)
-        page.on("console", lambda message: complaints.append(message.text))
-        page.on("pageerror", lambda error: complaints.append(str(error)))
-        page.on("dialog", lambda dialog: complaints.append(f"dialog {dialog.message}"))
-        page.on("request", lambda request: requests.append(request.url))
-        page.goto(which.as_uri())
-        return page
-
-    yield opened
-    for context in contexts:
-        context.close()
-    assert complaints == []
-    assert [url for url in requests if not url.startswith("file:")] == []
-    assert len(requests) == len(contexts)  # the file itself, and nothing beside it
+def opened(open_page: Opened, file: Path) -> Opened:
+    """Call with a viewport and such for the page, or for another one."""
+    return lambda which=file, **how: open_page(which, **how)
 
 
 def scrub(page: Any, frame: int) -> None:
@@ -261,6 +222,7 @@ def test_it_is_dark_in_the_dark(opened: Opened, shown: Shown) -> None:
     dark = pixel(page, *off_road)
     assert dark == colour(page, "ground")
     page.emulate_media(color_scheme="light")
+    page.wait_for_selector('html[data-scheme="light"]')
     light = pixel(page, *off_road)
     assert sum(light[:3]) > 3 * sum(dark[:3])
     assert light == colour(page, "ground")

@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 from support import rows
 
-from cavsumo.agents import Scene
+from cavsumo.agents import Agent, Scene
 from cavsumo.agents.policy import PolicyAgent, effort, make_agent, parameters_of
 from cavsumo.bodies import BUS, PEDESTRIAN
 from cavsumo.cli import main
@@ -24,24 +24,28 @@ from cavsumo.observations import VERSION, entries
 from cavsumo.policies import Header, Observed, Policy, read_policy, write_policy
 from cavsumo.results import read_manifest
 from cavsumo.snapshot import Snapshot
+from cavsumo.testing import AgentContract
 
 NAMES = tuple(name for name, _, _ in entries(1, 1.4, 1.0))
+NET = Path(__file__).parents[1] / "networks" / "pedestrians.net.xml"
 
 
 def header(**changed: Any) -> Header:
-    """The header of a policy for one pedestrian."""
-    return Header(**{"observation": Observed(version=VERSION, names=NAMES)} | changed)
+    """The header of a policy, for one pedestrian if nothing else is said."""
+    names = [name for name, _, _ in entries(changed.get("bodies", 1), 1.4, 1.0)]
+    return Header(**{"observation": Observed(version=VERSION, names=tuple(names))} | changed)
 
 
 def policy(outputs: int = 2, hidden: int = 4, **changed: Any) -> Policy:
     """A policy with one hidden layer and fixed random weights."""
-    rng, n = np.random.default_rng(7), len(NAMES)
+    said = header(**changed)
+    rng, n, bodies = np.random.default_rng(7), len(said.observation.names), said.bodies
     layers = (
         (rng.normal(size=(n, hidden)), rng.normal(size=hidden)),
         (0.1 * rng.normal(size=(hidden, outputs)), 0.1 * rng.normal(size=outputs)),
     )
-    table = rng.uniform(-1, 1, (outputs, 2)) if changed.get("actions") == "table" else None
-    return Policy(header(**changed), np.zeros(n), np.full(n, 10.0), layers, table)
+    table = rng.uniform(-1, 1, (outputs, 2 * bodies)) if said.actions == "table" else None
+    return Policy(said, np.zeros(n), np.full(n, 10.0), layers, table)
 
 
 def constant(*outputs: float, **changed: Any) -> Policy:
@@ -124,6 +128,20 @@ def test_a_target_is_walked_to_in_every_timestep(
     across = agent.choose_action(scene_snapshot(scene, testers=[(60.0, -5.15, 1.4, math.pi / 2)]))
     assert along[0].steering == PEDESTRIAN.steering_max
     assert across[0] == pytest.approx((0.0, 0.0), abs=1e-9)
+
+
+@pytest.mark.parametrize(("actions", "outputs"), [("effectors", 4), ("table", 3), ("targets", 10)])
+class TestPolicyContract(AgentContract):
+    """A policy that owns two bodies keeps the contract of tester agents, whatever it answers."""
+
+    net = NET
+
+    @pytest.fixture(autouse=True)
+    def _answering(self, actions: str, outputs: int) -> None:
+        self.policy = policy(outputs, actions=actions, bodies=2, hold=3)
+
+    def make(self) -> Agent:
+        return PolicyAgent(self.policy)
 
 
 def foreign(folder: Path, sort: str) -> Path:

@@ -1,4 +1,4 @@
-"""The README keeps its word: its commands exist and its examples run."""
+"""README and guide keep their word: their commands exist and their examples run."""
 
 from __future__ import annotations
 
@@ -13,7 +13,8 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).resolve().parents[1]
-README = (ROOT / "README.md").read_text(encoding="utf-8")
+FILES = ("README.md", "docs/guide.md")
+README = "\n".join((ROOT / file).read_text(encoding="utf-8") for file in FILES)
 REPORTS = sorted(set(re.findall(r"^cavsumo report [^`\n]*", README, re.MULTILINE)))
 COMMANDS = sorted(set(re.findall(r"cavsumo run [^`\n]*", README)))
 
@@ -61,7 +62,7 @@ def test_each_run_command_of_the_readme_runs(command: str, checkout: Path) -> No
 @pytest.mark.parametrize("command", REPORTS)
 def test_each_report_of_the_readme_is_written(command: str, checkout: Path) -> None:
     """The files it names are read, those after -o and --junit written."""
-    words = shlex.split(command)[1:]
+    words = shlex.split(command, comments=True)[1:]
     for name in words:
         if name.endswith(".csv") and name != "results.csv":
             shutil.copy(checkout / "results.csv", checkout / name)
@@ -71,6 +72,21 @@ def test_each_report_of_the_readme_is_written(command: str, checkout: Path) -> N
     for option, file in itertools.pairwise(words):
         if option in ("-o", "--junit"):
             assert (checkout / file).stat().st_size > 0
+
+
+@pytest.mark.parametrize("file", FILES)
+def test_links_lead_somewhere(file: str) -> None:
+    """To files and sections that exist."""
+    here = ROOT / file
+    for target in re.findall(r"\]\(([^)\s]+)\)", here.read_text(encoding="utf-8")):
+        if target.startswith("http"):
+            continue
+        name, _, section = target.partition("#")
+        there = (here.parent / name).resolve() if name else here
+        assert there.exists(), target
+        if section:
+            headings = re.findall(r"^#+ (.*)$", there.read_text(encoding="utf-8"), re.MULTILINE)
+            assert section in {h.lower().replace(" ", "-") for h in headings}, target
 
 
 def test_the_agents_of_the_readme_are_those_that_there_are(checkout: Path) -> None:

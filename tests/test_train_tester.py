@@ -80,13 +80,18 @@ def test_an_exported_policy_says_what_the_model_says(export: ModuleType) -> None
     normaliser = VecNormalize(DummyVecEnv([Still]), norm_reward=False)
     normaliser.obs_rms.mean = rng.uniform(low, high)
     normaliser.obs_rms.var = rng.uniform(0.01, 9.0, len(table))
+    normaliser.obs_rms.mean[-3:], normaliser.obs_rms.var[-3:] = high[-3:], 1e-9  # nobody else
     model = DQN("MlpPolicy", normaliser, policy_kwargs={"net_arch": [64, 64]}, seed=1, device="cpu")
     policy = export.exported(model, normaliser, 5, {})
     for _ in range(200):
         seen = rng.uniform(low, high).astype(np.float32)
+        seen[-3:] = high[-3:]
         normal = normaliser.normalize_obs(seen[None])
         scores = model.q_net(model.policy.obs_to_tensor(normal)[0]).detach().numpy()[0]
         assert policy.outputs(seen) == pytest.approx(scores, abs=1e-5)
+        others = seen.copy()
+        others[-3:] = rng.uniform(low, high)[-3:]
+        assert policy.outputs(others) == pytest.approx(scores, abs=1e-5), "others count for nothing"
         assert policy.targets(seen) == [int(model.predict(normal, deterministic=True)[0][0])]
 
 

@@ -45,8 +45,8 @@ def facts(record: Record, trace: Trace) -> list[tuple[str, str]]:
     found = [
         ("Network", scenario.net.name),
         ("Junction", scenario.junction or ""),
-        ("Traffic", _traffic(scenario)),
-        ("Ego", _ego(scenario)),
+        ("Traffic", traffic_words(scenario)),
+        ("Ego", ego_words(scenario)),
         ("Tester agent", row["agent"]),
         ("Parameters", " ".join(f"{k}={v}" for k, v in record.plan.params.items())),
         ("Testers", f"{row['testers']} ({scenario.kind})"),
@@ -65,14 +65,14 @@ def facts(record: Record, trace: Trace) -> list[tuple[str, str]]:
     return [(term, text) for term, text in found if text]
 
 
-def _ego(scenario: Scenario) -> str:
+def ego_words(scenario: Scenario) -> str:
     """The ego with its parameters, as they were given or, SUMO's driver, as they are."""
     ego = make_ego(scenario.ego, scenario.ego_params)
     params = getattr(ego, "attributes", scenario.ego_params)
     return " ".join((scenario.ego, *(f"{k}={v}" for k, v in params.items())))
 
 
-def _traffic(scenario: Scenario) -> str:
+def traffic_words(scenario: Scenario) -> str:
     """Where the background traffic comes from."""
     if scenario.traffic is not None:
         return "drawn, {:g},{:g} per minute and km".format(*scenario.traffic)

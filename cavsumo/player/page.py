@@ -7,9 +7,9 @@ from pathlib import Path
 from typing import Any
 
 from cavsumo.assertions import ASSERTIONS
-from cavsumo.errors import InputError
 from cavsumo.geometry import Box, Zones, zone_polygons
 from cavsumo.network import read_network
+from cavsumo.pages.shell import render, write
 from cavsumo.player.curves import moment
 from cavsumo.player.facts import facts, headline, marks, verdict
 from cavsumo.player.packing import ANGLE, MILLI, NOTHING, columns, packed, shapes
@@ -26,32 +26,19 @@ POSE = (MILLI, MILLI, MILLI, ANGLE)
 
 def write_page(record: Record, trace: Trace, site: Site, file: Path) -> None:
     """Write an episode as one page; raises InputError when the file cannot be written."""
-    text = page(record, trace, site)
-    try:
-        file.write_text(text, encoding="utf-8")
-    except OSError as error:
-        raise InputError(f"--html {str(file)!r}: {error.strerror}") from error
+    write(page(record, trace, site), file)
 
 
 def page(record: Record, trace: Trace, site: Site) -> str:
     """The page of an episode."""
-    import jinja2
-
-    environment = jinja2.Environment(
-        loader=jinja2.FileSystemLoader(FILES),
-        autoescape=True,
-        undefined=jinja2.StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-    )
-    return environment.get_template("page.html.j2").render(
+    return render(
+        FILES,
+        "player",
         title=headline(record),
         outcome=record.row["outcome"],
         verdict=verdict(record.row),
         facts=facts(record, trace),
         command=record.command,
-        style=(FILES / "player.css").read_text(encoding="utf-8"),
-        script=(FILES / "player.js").read_text(encoding="utf-8"),
         episode=episode(record, trace, site),
     )
 

@@ -84,8 +84,11 @@
   const pen = map.getContext("2d");
   let colours = {}, scheme = 0; // and how often they have changed
 
+  const dark = window.matchMedia("(prefers-color-scheme: dark)");
+
   function readColours() {
     scheme += 1;
+    document.documentElement.dataset.scheme = dark.matches ? "dark" : "light";
     const style = getComputedStyle(document.documentElement);
     const names = ("ground road other pavement walking line stripes borders route ego tester vehicle pedestrian " +
       "glass braking reaction outline red yellow green ink soft edge panel accent").split(" ");
@@ -708,7 +711,7 @@
   });
 
   readColours();
-  window.matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => { readColours(); draw(); });
+  dark.addEventListener("change", () => { readColours(); draw(); });
   new ResizeObserver(fit).observe($("stage"));
   window.addEventListener("resize", fit);
   fit();

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable
-from typing import Any
+from typing import Any, NamedTuple
 
 import shapely
 from shapely.geometry import LineString
@@ -18,11 +18,33 @@ from cavsumo.site import Site
 ALIKE_M = 0.03  # outlines are simplified by this much
 STOP_LINE_M = 3.2  # width of a drawn stop line
 
+View = tuple[float, float, float, float]  # west, south, east, north [m]
 
-def scenery(
-    network: Network, site: Site, view: tuple[float, float, float, float]
-) -> dict[str, Any]:
-    """What is drawn of a network within a view (west, south, east, north) [m], packed."""
+
+class Outlines(NamedTuple):
+    """What is drawn of a network, by what it is, in the order of drawing.
+
+    Attributes:
+        areas, lines: their points [m]; those of an area go round it.
+    """
+
+    areas: dict[str, list[list[Any]]]
+    lines: dict[str, list[list[Any]]]
+
+
+def scenery(network: Network, site: Site, view: View) -> dict[str, Any]:
+    """What is drawn of a network within a view, packed."""
+    ground = outlines(network, site, view)
+    return {
+        "areas": {name: shapes(found) for name, found in ground.areas.items()},
+        "lines": {name: shapes(found) for name, found in ground.lines.items()},
+        "lights": _lights(site),
+        "credit": surfaces.credit(network.file),
+    }
+
+
+def outlines(network: Network, site: Site, view: View) -> Outlines:
+    """What is drawn of a network within a view."""
     lanes = surfaces.lanes_by_kind(network)
     borders, stripes = _crossings(network)
     lines = list(surfaces.markings(network))
@@ -39,12 +61,10 @@ def scenery(
         "borders": borders,
         "route": [LineString(site.route.path.points)],
     }
-    return {
-        "areas": {name: shapes(_rings(found, view)) for name, found in areas.items()},
-        "lines": {name: shapes(_lines(found, view)) for name, found in strokes.items()},
-        "lights": _lights(site),
-        "credit": surfaces.credit(network.file),
-    }
+    return Outlines(
+        {name: _rings(found, view) for name, found in areas.items()},
+        {name: _lines(found, view) for name, found in strokes.items()},
+    )
 
 
 def _crossings(network: Network) -> tuple[list[LineString], list[shapely.Geometry]]:
@@ -70,23 +90,17 @@ def _lights(site: Site) -> str:
     return columns(rows, [CENTI] * 4)
 
 
-def _rings(
-    found: Iterable[shapely.Geometry], view: tuple[float, float, float, float]
-) -> list[list[Any]]:
+def _rings(found: Iterable[shapely.Geometry], view: View) -> list[list[Any]]:
     """The outlines of areas, as far as they are in view."""
     return [list(part.exterior.coords)[:-1] for part in _parts(found, view, "Polygon")]
 
 
-def _lines(
-    found: Iterable[shapely.Geometry], view: tuple[float, float, float, float]
-) -> list[list[Any]]:
+def _lines(found: Iterable[shapely.Geometry], view: View) -> list[list[Any]]:
     """The points of lines, as far as they are in view."""
     return [list(part.coords) for part in _parts(found, view, "LineString")]
 
 
-def _parts(
-    found: Iterable[shapely.Geometry], view: tuple[float, float, float, float], sort: str
-) -> list[Any]:
+def _parts(found: Iterable[shapely.Geometry], view: View, sort: str) -> list[Any]:
     """What is in view of shapes, part by part; what shapely cannot cut is left whole."""
     kept = []
     for shape in found:

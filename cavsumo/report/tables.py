@@ -17,6 +17,7 @@ from cavsumo.report.rates import EXACT, SEQUENTIAL, WILSON, Rates, Share
 from cavsumo.report.survival import TimeToTest
 from cavsumo.summary import interval, percent
 
+TOPICS = ("results", "shares", "pairs", "times", "effort", "distinct")
 SHOWN = 10  # cells of failures
 
 
@@ -25,14 +26,17 @@ class Table:
     """A table of text.
 
     Attributes:
+        topic: what it belongs to, one of ``TOPICS``.
         title: what it tells.
         words: the titles of its first columns, which hold words and stand to the left.
         numbers: the titles of the others, which hold numbers and stand to the right.
         rows: one cell a column.
         heads: in how many of the first columns words that repeat those above may be left out.
+        topic: what it belongs to, one of ``TOPICS``.
         notes: what one must know to read it, a sentence each.
     """
 
+    topic: str
     title: str
     words: Sequence[str]
     numbers: Sequence[str]
@@ -81,7 +85,9 @@ def _batches(batches: Sequence[Batch], report: Report) -> Table:
         cells = [str(batch.csv_file), scenario.name, testers, scenario.ego, str(status)]
         rows.append([*cells, str(batch.plan.seed), episodes])
     words = ("results", "network", "testers", "ego", "status")
-    return Table("Results", words, ("seed", "episodes"), rows, list(_batch_notes(batches)))
+    return Table(
+        "results", "Results", words, ("seed", "episodes"), rows, list(_batch_notes(batches))
+    )
 
 
 def _batch_notes(batches: Sequence[Batch]) -> Iterator[str]:
@@ -121,7 +127,9 @@ def _rates(found: Sequence[Rates], labels: Labels) -> Table:
             rows.append([*labels.cells(one), *cells, *("" for _ in methods)])
     titles = ("count", "", "share", *methods)
     words = (*labels.titles, "of what")
-    return Table("Shares, with 95 % intervals in %", words, titles, rows, heads=len(words) - 1)
+    return Table(
+        "shares", "Shares, with 95 % intervals in %", words, titles, rows, heads=len(words) - 1
+    )
 
 
 def _comparisons(report: Report, labels: Labels) -> Iterator[Table]:
@@ -135,7 +143,7 @@ def _comparisons(report: Report, labels: Labels) -> Iterator[Table]:
             rows = [_comparison(one, words) for one in found]
             title = f"{event.capitalize()} on the same seeds"
             notes = () if event == "tests" else _comparison_notes(report.comparisons)
-            yield Table(title, (*words, "first : second"), numbers, rows, notes)
+            yield Table("pairs", title, (*words, "first : second"), numbers, rows, notes)
 
 
 def _comparison(one: Comparison, words: Sequence[str]) -> list[str]:
@@ -147,7 +155,7 @@ def _comparison(one: Comparison, words: Sequence[str]) -> list[str]:
         str(one.pairs.total),
         str(one.pairs.first),
         str(one.pairs.second),
-        "" if one.ratio is None else _number(one.ratio),
+        "" if one.ratio is None else number(one.ratio),
         _span(one.interval),
         _p(one.p),
         _p(one.p_holm),
@@ -192,7 +200,9 @@ def _times(found: Sequence[TimeToTest], labels: Labels) -> Table:
         "ones too: a tester that came too early shows only that there was no test so far.",
         "1st test, 1st failure: in which valid episode.",
     ]
-    return Table("Time to the test, within an episode [s]", labels.titles, numbers, rows, notes)
+    return Table(
+        "times", "Time to the test, within an episode [s]", labels.titles, numbers, rows, notes
+    )
 
 
 def _effort(report: Report, labels: Labels) -> Table:
@@ -208,12 +218,12 @@ def _effort(report: Report, labels: Labels) -> Table:
     numbers = ("count", "per simulated s", "95 % interval", "per CPU s", "95 % interval")
     notes = [f"{_total(report.efforts)} CPU s: real time of the processes that played."]
     words = (*labels.titles, "")
-    return Table("Found per second", words, numbers, rows, notes, heads=len(words) - 1)
+    return Table("effort", "Found per second", words, numbers, rows, notes, heads=len(words) - 1)
 
 
 def _effort_cells(found: PerSecond) -> list[str]:
     """A figure per second with its interval."""
-    return ["" if found.value is None else _number(found.value), _span(found.interval)]
+    return ["" if found.value is None else number(found.value), _span(found.interval)]
 
 
 def _total(efforts: Sequence[Effort]) -> str:
@@ -241,7 +251,9 @@ def _distinct(found: Sequence[Distinct], labels: Labels) -> Table:
     if missing:
         notes.append("Where no trace was kept the cell is not known.")
     words = (*labels.titles, "")
-    return Table("How many are distinct", words, numbers, rows, notes, heads=len(words) - 1)
+    return Table(
+        "distinct", "How many are distinct", words, numbers, rows, notes, heads=len(words) - 1
+    )
 
 
 def _diversity_cells(diversity: Diversity) -> list[str]:
@@ -271,10 +283,12 @@ def _failures(found: Sequence[FailureCell], several: bool) -> Table:
     notes.append(f"To see one: cavsumo replay {'RESULTS' if several else found[0].file} RUN")
     numbers = ("at [m/s]", "after [m]", "failures", "run")
     words = ["setting", *words] if settings else words
-    return Table("Failures by cell, the most frequent first", words, numbers, rows, notes)
+    return Table(
+        "distinct", "Failures by cell, the most frequent first", words, numbers, rows, notes
+    )
 
 
-def _number(value: float) -> str:
+def number(value: float) -> str:
     """Three significant digits, without an exponent where that can be read."""
     if math.isinf(value) or value == 0:
         return f"{value:g}"
@@ -288,7 +302,7 @@ def _span(ends: Interval | None, form: str = "") -> str:
     """An interval, empty for none."""
     if ends is None:
         return ""
-    return "[{}, {}]".format(*(_number(e) if not form else format(e, form) for e in ends))
+    return "[{}, {}]".format(*(number(e) if not form else format(e, form) for e in ends))
 
 
 def _p(value: float) -> str:

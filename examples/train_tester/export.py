@@ -11,14 +11,14 @@ from stable_baselines3.common.vec_env import VecNormalize
 from cavsumo.observations import VERSION, entries
 from cavsumo.policies import Header, Observed, Policy
 
-CONSTANT = 1e-6  # variance below which an entry never changed in training
+NOTHING = 1e9  # a scale that leaves nothing of an entry
 
 
 def exported(model: DQN, normaliser: VecNormalize, hold: int, metadata: dict[str, Any]) -> Policy:
     """The greedy policy of a network that scores the targets of one pedestrian.
 
-    An entry that never changed in training (as those of other testers, where there were none) is
-    scaled to nothing, because the network has not learned what to make of it.
+    Where one pedestrian learned, there was no other, and the network has not learned what to make
+    of what others do: those entries are scaled to nothing.
     """
     network = model.q_net.q_net
     layers = [layer for layer in network if hasattr(layer, "weight")]
@@ -33,7 +33,8 @@ def exported(model: DQN, normaliser: VecNormalize, hold: int, metadata: dict[str
         actions="targets",
         metadata=metadata,
     )
-    scale = np.where(seen.var < CONSTANT, 1e9, np.sqrt(seen.var + normaliser.epsilon))
+    absent = np.array([name.startswith("other.") for name in names])
+    scale = np.where(absent, NOTHING, np.sqrt(seen.var + normaliser.epsilon))
     return Policy(header, seen.mean.astype(np.float64), scale, tuple(numbers))
 
 

@@ -143,7 +143,7 @@ def train(options: argparse.Namespace) -> Curve:
         n_steps=3,
         train_freq=2,
         target_update_interval=500,
-        exploration_fraction=0.4,
+        exploration_fraction=0.8,
         exploration_final_eps=0.05,
         policy_kwargs={"net_arch": [64, 64]},
         seed=options.seed,
@@ -187,17 +187,17 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0] if __doc__ else "")
     parser.add_argument("--net", type=Path, required=True, help="SUMO network")
     parser.add_argument("-o", "--output", type=Path, default=Path("tester.npz"), metavar="FILE")
-    parser.add_argument("--decisions", type=int, default=40_000, help="how long to train")
-    parser.add_argument("--every", type=int, default=5_000, help="decisions between evaluations")
-    parser.add_argument("--evaluations", type=int, default=100, help="episodes of an evaluation")
+    parser.add_argument("--decisions", type=int, default=20_000, help="how long to train")
+    parser.add_argument("--every", type=int, default=4_000, help="decisions between evaluations")
+    parser.add_argument("--evaluations", type=int, default=40, help="episodes of an evaluation")
     parser.add_argument("--seed", type=int, default=1, help="of the training")
     options = parser.parse_args()
+    curve = train(options)
+    write_curve(options.output.with_suffix(".csv"), curve.rows)
     played = evaluate(options.net, BASELINES, options.evaluations)
     baselines = {name: found for name, (found, _) in played.items()}
     for name, found in baselines.items():
         print(f"{name}: {found.count} tests in {found.total} episodes", flush=True)
-    curve = train(options)
-    write_curve(options.output.with_suffix(".csv"), curve.rows)
     draw(options.output.with_suffix(".svg"), curve.rows, baselines)
     agents = " ".join(f"--agent {name}" for name in BASELINES)
     print(f"\ncavsumo run --net {options.net} --agent policy:{options.output} {agents} --runs 300")
