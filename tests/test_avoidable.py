@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 import itertools
 import math
+import sys
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -337,3 +338,33 @@ def test_the_summary_says_how_many_were_preventable(
         assert f"1 failure, {count} of them preventable by a careful human driver (UN R157)" in said
     else:
         assert "preventable" not in said
+
+
+BLIND = r"""
+import json, sys
+for line in sys.stdin:
+    said = json.loads(line)
+    kind = said["type"]
+    if kind == "hello":
+        print(json.dumps({"type": "hello", "version": 1}), flush=True)
+    elif kind == "reset":
+        print("begun", file=sys.stderr, flush=True)
+        print(json.dumps({"type": "ready"}), flush=True)
+    elif kind == "close":
+        break
+    else:
+        print('{"acceleration": 0}', flush=True)
+"""
+
+
+def test_a_program_is_relieved_too(staged: Staged, tmp_path: Path) -> None:
+    """It is told to begin anew for each rerun; its log is that of the episode alone."""
+    (tmp_path / "blind.py").write_text(BLIND, encoding="utf-8")
+    ego = f"exec:{sys.executable} {tmp_path / 'blind.py'}"
+    plan, site = staged("pedestrians", **{**BATCH, "ego": ego, "ego_params": {"depart_speed": 7}})
+    with Theatre(plan, site) as theatre:
+        theatre.rehearse()
+        outcome = theatre.play(job(plan, 0))[0]
+    assert outcome.row["outcome"] == "violated", outcome.row.get("error")
+    assert (outcome.row["avoidable"], outcome.row["avoidable_note"]) == (1, "")
+    assert outcome.ego_log.count("begun") == 1
