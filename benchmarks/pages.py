@@ -16,7 +16,8 @@ from typing import Any
 
 from playwright.sync_api import sync_playwright
 
-from cavsumo.commands.run import Manner, run
+from cavsumo.checked import Manner
+from cavsumo.commands.run import run
 from cavsumo.executors import Means
 from cavsumo.player.page import write_page
 from cavsumo.replays import recorded

@@ -19,7 +19,8 @@ from collections import Counter
 from pathlib import Path
 from typing import Any
 
-from cavsumo.commands.run import Manner, run
+from cavsumo.checked import Manner
+from cavsumo.commands.run import run
 from cavsumo.errors import DivergenceError
 from cavsumo.executors import Means
 from cavsumo.replays import compare, recorded, recorded_alone, replayed

@@ -13,7 +13,7 @@ from cavsumo import __version__
 from cavsumo.cli_egos import add_check_ego
 from cavsumo.cli_networks import add_import_osm, add_inspect
 from cavsumo.cli_results import add_merge, add_replay, add_report
-from cavsumo.cli_settings import settings_of
+from cavsumo.cli_settings import parts_of
 from cavsumo.errors import BatchError, CavsumoError, DivergenceError, Exit, InputError
 
 HYPHENATED = ("--bbox", "--ego-route", "--junction")  # options whose values may begin with "-"
@@ -175,7 +175,12 @@ def _add_scenario(group: Any) -> None:
         "each, none; not with --routes FILE",
     )
     add("-a", "--additional-files", metavar="FILES", help="SUMO additional files, with commas")
-    add("-c", "--config", metavar="FILE", help="scenario file (TOML)")
+    add(
+        "-c",
+        "--config",
+        metavar="FILE",
+        help="scenario file (TOML); with a table [vary] of lists, a batch for each combination",
+    )
     add(
         "--ego",
         metavar="NAME",
@@ -214,13 +219,19 @@ def _add_scenario(group: Any) -> None:
 
 def _add_testers(group: Any) -> None:
     add = group.add_argument
-    add("--agent", dest="agents", action="append", metavar="NAME", help="repeat to compare")
+    add(
+        "--agent",
+        dest="agents",
+        action="append",
+        metavar="NAME",
+        help="repeat to compare; LABEL=NAME for one with parameters of its own",
+    )
     add("--testers", type=int, metavar="N", help="number of tester bodies (default 3)")
     add(
         "--param",
         action="append",
         metavar="KEY=VALUE",
-        help="parameter of the agents that have it; AGENT.KEY=VALUE for one of them",
+        help="parameter of the agents that have it; NAME.KEY=VALUE or LABEL.KEY=VALUE for one",
     )
     add(
         "--tester-sensor",
@@ -249,12 +260,13 @@ def _add_testers(group: Any) -> None:
 
 
 def _run(options: argparse.Namespace) -> int:
-    from cavsumo.commands.run import Manner, run
+    from cavsumo.checked import Manner
+    from cavsumo.commands.run import run_study
     from cavsumo.executors import Means
 
     manner = Manner(**{f.name: getattr(options, f.name) for f in dataclasses.fields(Manner)})
     means = Means(options.jobs, options.executor, options.scheduler)
-    return run(settings_of(options), Path(options.output), means, manner)
+    return run_study(parts_of(options), Path(options.output), means, manner)
 
 
 def _list(options: argparse.Namespace) -> int:

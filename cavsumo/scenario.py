@@ -7,8 +7,7 @@ are refused with the nearest valid one.
 from __future__ import annotations
 
 import math
-import tomllib
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -23,6 +22,7 @@ from pydantic import (
 
 from cavsumo.checks import densities
 from cavsumo.errors import InputError, UnknownName
+from cavsumo.labels import cast_of
 from cavsumo.sensors import Sensor
 
 SHARED_BY = 25  # episodes that share one simulation when asked to
@@ -126,7 +126,9 @@ class BatchPlan(BaseModel):
     model_config = ConfigDict(extra="forbid", frozen=True)
 
     scenario: Scenario
-    agents: tuple[str, ...] = Field(("timing",), min_length=1)
+    agents: tuple[str, ...] = Field(
+        ("timing",), min_length=1, description="names of agents, or LABEL=NAME"
+    )
     params: Params = Field(default_factory=dict)
     runs: int = Field(100, ge=1, le=10_000_000)
     seed: int = Field(1, ge=0, le=2**63 - 1)
@@ -164,6 +166,17 @@ class BatchPlan(BaseModel):
             part_of(value) if info.field_name == "shard" else half_width(value)
         return value
 
+    @field_validator("agents")
+    @classmethod
+    def _told_apart(cls, value: tuple[str, ...]) -> tuple[str, ...]:
+        cast_of(value)
+        return value
+
+    @property
+    def cast(self) -> dict[str, str]:
+        """The names of the agents by their labels, in the order in which they take turns."""
+        return cast_of(self.agents)
+
     @property
     def block(self) -> int:
         """How many episodes in a row share one simulation, and are played by one process."""
@@ -185,10 +198,10 @@ class BatchPlan(BaseModel):
         """How many episodes that are."""
         return self.runs * len(self.agents) if self.shard is None else sum(1 for _ in self.todo())
 
-    def agent_params(self, agent: str, known: Mapping[str, list[str]]) -> Params:
-        """The parameters meant for one agent: its own (``agent.key``) and those it knows."""
-        prefix = f"{agent}."
-        mine = {k: v for k, v in self.params.items() if "." not in k and k in known[agent]}
+    def agent_params(self, label: str, known: Sequence[str]) -> Params:
+        """The parameters meant for one agent: its own (``label.key``) and those it knows."""
+        prefix = f"{label}."
+        mine = {k: v for k, v in self.params.items() if "." not in k and k in known}
         return mine | {
             k.removeprefix(prefix): v for k, v in self.params.items() if k.startswith(prefix)
         }
@@ -216,20 +229,7 @@ def part_of(text: str) -> tuple[int, int]:
 
 SCENARIO_KEYS = frozenset(Scenario.model_fields)
 PLAN_KEYS = frozenset(BatchPlan.model_fields) - {"scenario"}
-PATH_KEYS = ("net", "routes", "additional")
 SENSOR_KEYS = ("ego_sensor", "tester_sensor")
-
-
-def read_config(file: Path) -> dict[str, Any]:
-    """The keys of a scenario file (TOML), paths resolved against its folder."""
-    try:
-        data = tomllib.loads(file.read_text(encoding="utf-8"))
-    except OSError as error:
-        raise InputError(f"config {str(file)!r}: {error.strerror}") from error
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        raise InputError(f"config {str(file)!r}: {error}") from error
-    _check_keys(data, str(file))
-    return {k: _resolved(k, v, file.parent) for k, v in data.items()}
 
 
 def plan_from(settings: Mapping[str, Any], source: str) -> BatchPlan:
@@ -239,7 +239,7 @@ def plan_from(settings: Mapping[str, Any], source: str) -> BatchPlan:
     found when none is named and no traffic is to be drawn; ``routes = "none"`` keeps the roads
     empty.
     """
-    _check_keys(settings, source)
+    check_keys(settings, source)
     if "net" not in settings:
         raise InputError(f"{source}: no network given; name one with --net FILE")
     scenario = {k: v for k, v in settings.items() if k in SCENARIO_KEYS}
@@ -269,7 +269,7 @@ def plan_from(settings: Mapping[str, Any], source: str) -> BatchPlan:
     return plan
 
 
-def _check_keys(settings: Mapping[str, Any], source: str) -> None:
+def check_keys(settings: Mapping[str, Any], source: str) -> None:
     """Refuse keys that no setting has."""
     for key in settings:
         if key not in SCENARIO_KEYS | PLAN_KEYS:
@@ -301,23 +301,6 @@ def _route_file(scenario: Mapping[str, Any], source: str) -> Path | None:
         if file.is_file():
             return file
     return None
-
-
-def _resolved(key: str, value: Any, folder: Path) -> Any:
-    """A path of a scenario file, relative to that file, as SUMO has it in its own."""
-    if key == "agents" and isinstance(value, list):
-        return [_resolved_agent(name, folder) for name in value]
-    if key not in PATH_KEYS or value == "none":
-        return value
-    if isinstance(value, list):
-        return [str(folder / str(v)) for v in value]
-    return str(folder / str(value))
-
-
-def _resolved_agent(name: Any, folder: Path) -> Any:
-    """An agent of a scenario file; the file of a policy is a path like others."""
-    prefix, colon, file = str(name).partition(":")
-    return f"{prefix}:{folder / file}" if prefix == "policy" and colon and file else name
 
 
 def _first_problem(error: ValidationError) -> str:

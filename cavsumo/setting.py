@@ -132,17 +132,17 @@ def _check_kind(plan: BatchPlan, kind: Kind) -> None:
         if plan.scenario.approaches:
             raise InputError(f"kind {kind.name!r}: only vehicles have approaches; name a --kind")
         return
-    for name in plan.agents:
-        if not all(agent.drives for agent in make_agents(plan, name)):
+    for label in plan.cast:
+        if not all(agent.drives for agent in make_agents(plan, label)):
             raise InputError(
-                f"kind {kind.name!r}: agent {name} can only walk; choose another agent or kind "
+                f"kind {kind.name!r}: agent {label} can only walk; choose another agent or kind "
                 f"{' or '.join(WALKING)}"
             )
 
 
 def _types(plan: BatchPlan) -> tuple[str, ...]:
     """The types of approach on which all agents can do the one manoeuvre asked of them."""
-    agents = [agent for name in plan.agents for agent in make_agents(plan, name)]
+    agents = [agent for label in plan.cast for agent in make_agents(plan, label)]
     names = {getattr(agent, "manoeuvre", "auto") for agent in agents}
     return types_for(names.pop()) if len(names) == 1 else ()
 

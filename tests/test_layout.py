@@ -32,12 +32,13 @@ ORDER = """
     references.encounter references.base references.ideal references.human references.rss references
     egos.base egos.takeover egos.constant egos.sumo egos.time_gap egos.effectors egos.controller
     egos.protocol egos.link egos.child egos.wire egos.external egos.specs egos
-    options scenario outcomes rewards ego_rewards sumo_types demand simulations world
+    options labels scenario config study outcomes rewards ego_rewards
+    sumo_types demand simulations world
     foresight jobs stage simulator counterfactual setting traces theatre worker_process worker batch
     executors
     envs.spaces envs.puppets envs.settings envs.events envs.episodes envs.elsewhere_process
     envs.elsewhere envs.painting envs.base envs.tester envs.ego envs.parallel envs.discrete envs
-    statistics tally stopping results recorder learning progress session
+    statistics tally stopping results recorder learning progress session checked
     summary interrupts replays listings fcd gui
     pages.shell pages player.packing player.curves player.scenery player.facts player.page player
     report report.load report.grouping report.rates report.pairs report.compare report.survival

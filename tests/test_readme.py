@@ -33,11 +33,12 @@ def checkout(tmp_path_factory: pytest.TempPathFactory) -> Path:
     for name in ("networks", "routes", "examples"):
         (folder / name).symlink_to(ROOT / name)
     example = re.search(r"<!-- example: (\S+) -->\n```python\n(.*?)```", README, re.DOTALL)
-    scenario = re.search(r"```toml\n(.*?)```", README, re.DOTALL)
+    scenarios = re.findall(r"```toml\n(# (\S+):.*?)```", README, re.DOTALL)
     assert example
-    assert scenario
+    assert len(scenarios) == 2
     (folder / example[1]).write_text(example[2], encoding="utf-8")
-    (folder / "scenario.toml").write_text(scenario[1], encoding="utf-8")
+    for text, name in scenarios:
+        (folder / name).write_text(text, encoding="utf-8")
     (folder / "my.net.xml").symlink_to(ROOT / "networks" / "pedestrians.net.xml")
     first = ["run", "--net", "my.net.xml", "-r", "none", "--runs", "1", "--end", "1"]
     cavsumo([*first, "-o", "results.csv"], folder)

@@ -13,9 +13,10 @@ from typing import Any
 
 import pytest
 
+from cavsumo.checked import Manner
 from cavsumo.cli import main
 from cavsumo.commands.replay import Wanted, replay
-from cavsumo.commands.run import Manner, run
+from cavsumo.commands.run import run
 from cavsumo.errors import DivergenceError, Exit, InputError, ResultsError
 from cavsumo.executors import Means
 from cavsumo.outcomes import COLUMNS, Outcome

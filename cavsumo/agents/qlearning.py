@@ -146,7 +146,7 @@ def load_weights(file: Path) -> list[float]:
     try:
         data = json.loads(file.read_text(encoding="utf-8"))
         if "learned" in data:  # the manifest of a batch
-            data = data["learned"]["q-learning"][0]
+            data = _learner(data["learned"])[0]
         weights = [number(name, data["weights"][name]) for name in FEATURES]
     except OSError as error:
         raise ValueError(f"weights {str(file)!r}: {error.strerror}") from error
@@ -158,3 +158,10 @@ def load_weights(file: Path) -> list[float]:
     if not all(math.isfinite(w) for w in weights):
         raise ValueError(f"weights {str(file)!r}: every weight must be finite")
     return weights
+
+
+def _learner(learned: Mapping[str, Any]) -> Any:
+    """What the learner of a batch knows: that of no label, or the only one."""
+    if "q-learning" not in learned and len(learned) == 1:
+        return next(iter(learned.values()))
+    return learned["q-learning"]

@@ -13,7 +13,7 @@ from cavsumo.recorder import Recorder
 from cavsumo.replays import recorded_plan
 from cavsumo.results import ego_log_name, whole_lines
 from cavsumo.setting import differences
-from cavsumo.summary import summarise
+from cavsumo.summary import Ended, summarise
 from cavsumo.tally import Tally
 
 SHOWN = 5  # missing episodes that are named
@@ -36,7 +36,7 @@ def merge(parts: Sequence[Path], output: Path, overwrite: bool, quiet: bool) -> 
         facts = {"episodes": tally.rows, "counts": tally.all.outcomes}
         recorder.finish("finished", facts)
     if not quiet:
-        summarise(tally, output, recorder.traces)
+        summarise([Ended("", output, tally, recorder.traces)])
     return Exit.OK
 
 

@@ -9,12 +9,13 @@ from typing import Any
 
 from cavsumo.bodies import WALKING
 from cavsumo.checks import choice, whole
+from cavsumo.config import read_config
 from cavsumo.egos import make_ego
 from cavsumo.egos.base import Ego
 from cavsumo.envs.puppets import ACTIONS, PuppetEgo
 from cavsumo.errors import InputError, UnknownName
 from cavsumo.jobs import learners
-from cavsumo.scenario import SCENARIO_KEYS, plan_from, read_config
+from cavsumo.scenario import SCENARIO_KEYS, plan_from
 from cavsumo.setting import Setting, prepare
 
 UNTIL = ("game", "verdict")

@@ -36,7 +36,7 @@ def _suite(batch: Batch, rows: pandas.DataFrame) -> ET.Element:
     suite = ET.Element("testsuite", name=_legal(str(batch.csv_file)))
     properties = ET.SubElement(suite, "properties")
     cases = []
-    for agent in batch.plan.agents:
+    for agent in batch.plan.cast:
         own = rows[rows["agent"] == agent]
         _properties(properties, agent, rates(Group("", agent, "", own, batch.sequential)))
         cases += [_case(batch, agent, name, own) for name in batch.plan.scenario.assertions]
