@@ -223,6 +223,12 @@ def _add_scenario(group: Any) -> None:
         help="temporal logic, such as 'apart=always (gap_m > 0.5)'; asserted unless --assert names "
         "others",
     )
+    add(
+        "--reference",
+        choices=("none", "ideal", "human", "rss"),
+        help="the driver who takes over to see whether a violation was avoidable (default human: "
+        "careful and competent, UN R157); none to leave it out",
+    )
 
 
 def _add_testers(group: Any) -> None:

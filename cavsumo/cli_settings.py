@@ -16,7 +16,7 @@ PLAIN = (
     "net routes traffic ego junction signal agents runs seed end step_length testers kind jaywalk "
     "approaches "
     "bodies_per_agent embodiment sumo_width start_speed trace assertions "
-    "reset shard first until_tests until_half_width until_rate"
+    "reference reset shard first until_tests until_half_width until_rate"
 ).split()
 
 

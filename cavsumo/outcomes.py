@@ -49,7 +49,13 @@ COLUMNS: Mapping[str, str] = {
     "ego_speed_mps": "speed of the ego at the violation, else at the trigger",
     "impact_speed_mps": "closing speed along the ego's heading at contact",
     "max_decel_mps2": "hardest braking of the ego",
-    "avoidable": "whether the ego could still have avoided it (not judged in this version)",
+    "avoidable": "1 if the reference driver would have avoided the violation, else 0; empty if not "
+    "judged",
+    "reference": "the reference driver",
+    "last_chance_s": "latest time at which it could have perceived the risk and avoided it; empty "
+    "for never",
+    "margin_s": "how long before the violation that is",
+    "avoidable_note": "why it was not judged, or what to doubt",
     "cost": "time that the testers spent on the carriageway, together [s]",
     "accel_rms_mps2": "root mean square of the testers' accelerations over all timesteps",
     "turning_rad": "how far the testers turned, to either side, together",

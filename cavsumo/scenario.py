@@ -160,6 +160,9 @@ class BatchPlan(BaseModel):
         description="begin every episode in a simulation of its own, or search in a shared one and "
         "play what was found again in its own",
     )
+    reference: Literal["none", "ideal", "human", "rss"] = Field(
+        "human", description="the driver who might have avoided a violation"
+    )
     shard: str | None = Field(None, description="part I/N of the episodes, I from 1 to N")
     first: bool = Field(False, description="stop at the first failure")
     until_tests: int | None = Field(None, ge=1, description="stop after so many tests")

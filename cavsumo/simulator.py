@@ -34,9 +34,16 @@ from cavsumo.validity import Breach, Umpire
 OVERTIME_S = 15.0
 
 
+# What all agents chose at one timestep: for each its bodies' actions.
+Joint = Sequence[Sequence[Action]]
+
+
 @dataclass
 class Episode:
-    """What happened, while and after it happens."""
+    """What happened, while and after it happens.
+
+    Frames and actions only where they are kept; ``drives``: whether the ego steers itself.
+    """
 
     judgement: Judgement
     verdicts: Mapping[str, str] = field(default_factory=dict)
@@ -56,6 +63,8 @@ class Episode:
     teleports: int = 0
     emergency_stops: int = 0
     frames: list[Snapshot] = field(default_factory=list)
+    actions: list[Joint] = field(default_factory=list)
+    drives: bool = False
 
     @property
     def outcome(self) -> str:
@@ -69,7 +78,8 @@ class Performance:
     Args:
         agents: one for each team, kept from episode to episode, so that learners learn.
         seed: of the episode; every random number in it comes from here.
-        record: keep every snapshot.
+        record: keep every snapshot, and show everybody in it.
+        keep: keep every snapshot as it is, and what the agents chose, to play it again.
         simulation: whose it is played in (``World.reset``).
 
     Attributes:
@@ -86,9 +96,10 @@ class Performance:
         seed: int,
         *,
         record: bool = False,
+        keep: bool = False,
         simulation: Simulation = "own",
     ) -> None:
-        self._stage, self._agents, self._record = stage, agents, record
+        self._stage, self._agents, self._record = stage, agents, record or keep
         self.scene, self.snapshot, self._senses = _reset(stage, agents, seed, record, simulation)
         self._show(self.snapshot)
         self._ledger = Ledger(self.scene, stage.teams)
@@ -109,8 +120,11 @@ class Performance:
         actions = [a.choose_action(view) for a, view in zip(agents, views, strict=True)]
         states = _moved(snapshot.testers, stage.teams, actions, scene.dt)
         command = stage.ego.act(self.ego_view)
+        episode.drives = isinstance(command, Drive)
+        if self._record:
+            episode.actions.append(actions)
         successor = stage.world.step(states, command)
-        if successor is None or (isinstance(command, Drive) and _at_end(scene, successor)):
+        if successor is None or (episode.drives and _at_end(scene, successor)):
             self._end(True)
             rewards = self._ledger.lost()
             _feed_back(agents, views, actions, rewards, views)
@@ -191,10 +205,11 @@ def play(
     seed: int,
     *,
     record: bool = False,
+    keep: bool = False,
     simulation: Simulation = "own",
 ) -> Episode:
     """A whole episode; the arguments are those of ``Performance``."""
-    performance = Performance(stage, agents, seed, record=record, simulation=simulation)
+    performance = Performance(stage, agents, seed, record=record, keep=keep, simulation=simulation)
     while not performance.over:
         performance.step()
     return performance.finished()

@@ -12,6 +12,7 @@ from rich.table import Table
 
 from cavsumo.assertions.base import HELD, INVALID, UNFAIR, VIOLATED
 from cavsumo.outcomes import cell, is_failure
+from cavsumo.references import REFERENCES
 from cavsumo.statistics import Rate
 from cavsumo.tally import Found, Row, Tally, found_by
 
@@ -60,6 +61,8 @@ def summarise(ended: Sequence[Ended]) -> None:
         f"by the ego.  {_files(ended)}",
     )
     _say_invalid(ended, console)
+    for one in ended:
+        _say_preventable(one, console)
     _say_errors(ended, console)
     if not together.failures and together.tests:
         sequential = any(one.sequential for one in ended)
@@ -175,6 +178,24 @@ def _cells(found: Found, sequential: bool, invalid: bool) -> list[str]:
         str(found.errors),
         "" if median is None else f"{median:.1f} s",
     ]
+
+
+def _say_preventable(one: Ended, console: Console) -> None:
+    """How many failures of a batch the reference driver would have avoided, if that was asked."""
+    row = one.tally.first.get("failure")
+    reference = str(row.get("reference") or "") if row else ""
+    if reference not in REFERENCES:
+        return
+    together = one.tally.all
+    left = together.failures - together.preventable.total()
+    words = REFERENCES.make(reference, {}).words
+    _say(
+        console,
+        (f"{one.name}: " if one.name else "")
+        + f"{together.failures} failure{'s' * (together.failures > 1)}, "
+        f"{together.preventable[True]} of them preventable by {words}"
+        + (f", {left} not judged" if left else ""),
+    )
 
 
 def _say_first(ended: Sequence[Ended], console: Console) -> None:

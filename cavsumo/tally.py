@@ -24,12 +24,14 @@ class Found:
         fresh: how many rows are of episodes in a simulation of their own.
         times: when tests were triggered, by time [s] to three decimals.
         verdicts: for each assertion, how often it said what.
+        preventable: failures that the reference driver would have avoided (True) or not (False).
     """
 
     outcomes: Counter[str] = field(default_factory=Counter)
     fresh: int = 0
     times: Counter[float] = field(default_factory=Counter)
     verdicts: dict[str, Counter[str]] = field(default_factory=dict)
+    preventable: Counter[bool] = field(default_factory=Counter)
 
     @property
     def episodes(self) -> int:
@@ -107,6 +109,8 @@ class Tally:
             self.first.setdefault("test", row)
         if is_failure(row):
             self.first.setdefault("failure", row)
+            if cell(row.get("avoidable")):
+                found.preventable[cell(row["avoidable"]) == "1"] += 1
         if row["outcome"] in ("error", INVALID):
             self.first.setdefault(row["outcome"], row)
 
@@ -122,6 +126,7 @@ def found_by(agents: Iterable[Found]) -> Found:
     for found in agents:
         together.outcomes.update(found.outcomes)
         together.fresh += found.fresh
+        together.preventable.update(found.preventable)
     return together
 
 

@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from functools import cached_property
 from typing import Any
 
 from cavsumo.agents import Agent
 from cavsumo.assertions.base import INVALID, VIOLATED, Judgement
+from cavsumo.counterfactual import Retrial, Verdict
 from cavsumo.errors import CavsumoError, EgoError
 from cavsumo.jobs import Job, episode_seed, failed_row, head, make_agents
 from cavsumo.outcomes import Outcome, Row, verdicts_cell
+from cavsumo.references import REFERENCES
 from cavsumo.scenario import BatchPlan, Simulation
 from cavsumo.simulator import Episode, play
 from cavsumo.site import Site
@@ -52,27 +54,49 @@ class Theatre:
         simulation: Simulation = "own" if self.plan.reset == "fresh" else "new"
         self.stage.world.reset(episode_seed(self.plan.seed, 0), (), (), simulation=simulation)
 
-    def play(self, job: Job) -> tuple[Outcome, tuple[Any, ...] | None]:
-        """Play a job: its outcome, and what the agents know afterwards if they learn."""
+    def play(
+        self, job: Job, beat: Callable[[], None] = lambda: None
+    ) -> tuple[Outcome, tuple[Any, ...] | None]:
+        """Play a job: its outcome, and what the agents know afterwards if they learn.
+
+        ``beat`` is called whenever another simulation begins for it.
+        """
         begun = time.perf_counter()
+        log = ""
         try:
             agents = self._cast(job)
             before = _recall(agents)
+            own = job.simulation == "own"
+            record = job.record or (self.plan.trace != "none" and own)
+            retry = own and self.plan.reference != "none"
             episode = play(
-                self.stage,
-                agents,
-                job.seed,
-                record=job.record or (self.plan.trace != "none" and job.simulation == "own"),
-                simulation=job.simulation,
+                self.stage, agents, job.seed, record=record, keep=retry, simulation=job.simulation
             )
-            row = head(self.plan, job) | measured(episode)
-            trace = self._trace(job, row, before, episode)
             memory = _recall(agents)
+            row = head(self.plan, job) | measured(episode)
+            log = self.stage.ego.take_log()
+            if retry and episode.outcome == VIOLATED:
+                retrial = Retrial(self.stage, agents, job.seed, record, episode, beat)
+                row |= self._avoidable(retrial)
+            trace = self._trace(job, row, before, episode) if record else ""
         except Exception as error:  # whatever it is, it costs this row and no other
             said = str(error) if isinstance(error, CavsumoError) else f"defect: {error!r}"
             row, trace, memory = failed_row(self.plan, job, said), "", job.memory
         row["wall_s"] = time.perf_counter() - begun
-        return Outcome(row, trace, self.stage.ego.take_log()), memory
+        said_later = self.stage.ego.take_log()  # of an episode that failed; a rerun's is not kept
+        return Outcome(row, trace, log or said_later), memory
+
+    def _avoidable(self, retrial: Retrial) -> Row:
+        """Whether the plan's reference driver would have avoided a violation."""
+        verdict: Verdict = retrial.judged(REFERENCES.make(self.plan.reference, {}))
+        avoidable = None if verdict.avoidable is None else int(verdict.avoidable)
+        return {
+            "avoidable": avoidable,
+            "reference": self.plan.reference,
+            "last_chance_s": verdict.last_chance,
+            "margin_s": verdict.margin,
+            "avoidable_note": verdict.note,
+        }
 
     def _cast(self, job: Job) -> list[Agent]:
         """The agents of a job, with their memory."""

@@ -28,7 +28,7 @@ from cavsumo.outcomes import Outcome, is_test
 from cavsumo.processes import ending, inner_environment
 from cavsumo.scenario import Simulation
 from cavsumo.setting import Setting
-from cavsumo.worker_process import GOODBYE
+from cavsumo.worker_process import GOES_ON, GOODBYE
 
 STARTUP_S = 120.0  # imports, SUMO's first start and that of the ego, on a slow machine
 STUCK_S = 20  # how long a message may stop half-way
@@ -121,7 +121,9 @@ class Worker:
             except OSError:  # it died while it waited: the job has not begun
                 self._stop()
                 continue
-            answer: Answer | str = self._receive(self.setting.plan.deadline_s)
+            answer: Answer | str = GOES_ON
+            while answer == GOES_ON:  # each simulation has the whole deadline
+                answer = self._receive(self.setting.plan.deadline_s)
             if not isinstance(answer, str):
                 self._played += 1
                 return answer

@@ -20,6 +20,7 @@ from cavsumo.setting import Setting
 
 IDLE_S = 60.0  # a process with nothing to do for so long goes
 GOODBYE = "goodbye"  # its last message then
+GOES_ON = "goes on"  # said when another simulation begins for the same job
 ALARM_AFTER_S = 30.0  # how long after an episode's deadline the process ends itself
 
 
@@ -49,10 +50,18 @@ def _serve(pipe: Connection, setting: Setting, strict: bool) -> None:
             pipe.send(str(error))
             return
         pipe.send(None)
+
+        def alarm() -> None:
+            signal.setitimer(signal.ITIMER_REAL, setting.plan.deadline_s + ALARM_AFTER_S)
+
+        def beat() -> None:
+            alarm()
+            pipe.send(GOES_ON)
+
         while pipe.poll(IDLE_S):
             job: Job = pipe.recv()
-            signal.setitimer(signal.ITIMER_REAL, setting.plan.deadline_s + ALARM_AFTER_S)
-            answer = theatre.play(job)
+            alarm()
+            answer = theatre.play(job, beat)
             signal.setitimer(signal.ITIMER_REAL, 0.0)
             pipe.send(answer)
         pipe.send(GOODBYE)

@@ -109,6 +109,7 @@ class World:
         self._driven: BodyState | None = None
         self._told: dict[str, tuple[BodyState, tuple[float, float, float]]] = {}
         self._step, self._steering = 0, 0.0
+        self._commanded = False
         self._vehicles: tuple[str, ...] = ()
         if simulation == "same":
             self._check_own()
@@ -261,7 +262,8 @@ class World:
         """Pass on what the ego does; None leaves it to SUMO."""
         if command is None:
             return
-        if self._step == 0:
+        if not self._commanded:  # its first command may come late, when another driver takes over
+            self._commanded = True
             libsumo.vehicle.setSpeedMode(EGO, UNSAFE)
         ego, kind = self._ego, self.ego_body.kind
         if isinstance(command, Acceleration):

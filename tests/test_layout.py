@@ -36,11 +36,13 @@ ORDER = """
     assertions.reasons assertions.standing assertions.hard_braking assertions.rss
     assertions.criticality assertions.formula assertions.custom assertions.specs assertions
     validity blame
-    egos.base egos.constant egos.sumo egos.time_gap egos.effectors egos.controller
+    references.encounter references.base references.ideal references.human references.rss references
+    egos.base egos.takeover egos.constant egos.sumo egos.time_gap egos.effectors egos.controller
     egos.protocol egos.link egos.child egos.wire egos.external egos.specs egos
     options labels scenario config study outcomes rewards ego_rewards
     sumo_types demand simulations world
-    jobs stage simulator setting traces theatre worker_process worker batch executors
+    foresight jobs stage simulator counterfactual setting traces theatre worker_process worker batch
+    executors
     envs.spaces envs.puppets envs.settings envs.events envs.episodes envs.elsewhere_process
     envs.elsewhere envs.painting envs.base envs.tester envs.ego envs.parallel envs.discrete envs
     statistics tally stopping results recorder learning progress session checked

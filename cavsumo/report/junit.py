@@ -53,6 +53,7 @@ def _properties(parent: ET.Element, agent: str, found: Rates) -> None:
         ("tests", found.tests),
         ("failures", found.failures),
         ("unfair", found.unfair),
+        *([("preventable", found.preventable)] if found.preventable.total else []),
     ):
         spans = "; ".join(f"{m} {interval(r)}" for m, r in share.intervals.items() if share.total)
         text = f"{share.count} of {share.total} {share.of}"

@@ -20,7 +20,14 @@ from cavsumo.stopping import looks_at_rows
 
 OUTCOMES = ("violated", "held", "unfair", "not_triggered", "invalid", "error")
 # What a report needs of the rows; other columns are read only when asked for.
-NUMBERS = ("trigger_time_s", "violation_time_s", "time_s", "impact_speed_mps", "wall_s")
+NUMBERS = (
+    "trigger_time_s",
+    "violation_time_s",
+    "time_s",
+    "impact_speed_mps",
+    "wall_s",
+    "avoidable",
+)
 WORDS = ("agent", "outcome", "assertion", "tester", "trace", "error", "verdicts")
 WHOLE = ("run", "seed")
 NEEDED = (*WHOLE, *WORDS, *NUMBERS)

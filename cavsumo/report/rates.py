@@ -43,6 +43,7 @@ class Rates(Told):
         episodes, invalid, errors: how many there are, in how many a tester broke the rules of the
             world, how many could not be played.
         tests, failures, unfair: of valid episodes, of tests, of valid episodes.
+        preventable: failures that the reference driver would have avoided, of those judged.
     """
 
     episodes: int
@@ -51,12 +52,14 @@ class Rates(Told):
     tests: Share
     failures: Share
     unfair: Share
+    preventable: Share
 
 
 def rates(group: Group) -> Rates:
     """The shares of one group."""
     found = Found(Counter(group.rows["outcome"]))
     sequential = group.sequential
+    judged = group.rows["avoidable"].dropna()
     return Rates(
         *group.whose,
         episodes=found.episodes,
@@ -65,6 +68,9 @@ def rates(group: Group) -> Rates:
         tests=share(found.tests, found.valid, "valid episodes", sequential=sequential),
         failures=share(found.failures, found.tests, "tests", sequential=sequential),
         unfair=share(found.unfair, found.valid, "valid episodes", sequential=sequential),
+        preventable=share(
+            int((judged == 1).sum()), len(judged), "judged failures", sequential=sequential
+        ),
     )
 
 

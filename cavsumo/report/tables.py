@@ -110,12 +110,15 @@ def _batch_notes(batches: Sequence[Batch]) -> Iterator[str]:
 
 def _rates(found: Sequence[Rates], labels: Labels) -> Table:
     """Shares with intervals."""
-    shares = [share for one in found for share in (one.tests, one.failures, one.unfair)]
+    kinds = ("tests", "failures", "unfair", "preventable")
+    shares = [getattr(one, what) for one in found for what in kinds]
     methods = [m for m in (WILSON, EXACT, SEQUENTIAL) if any(m in s.intervals for s in shares)]
     rows = []
     for one in found:
-        for what in ("tests", "failures", "unfair"):
+        for what in kinds:
             share: Share = getattr(one, what)
+            if what == "preventable" and not share.total:
+                continue
             cells = [what, str(share.count), f"of {share.total} {share.of}", percent(share.value)]
             spans = [interval(share.intervals[m]) if m in share.intervals else "" for m in methods]
             rows.append([*labels.cells(one), *cells, *spans])

@@ -1,0 +1,370 @@
+"""Avoidable or not: scripted episodes in SUMO whose answer is known, batches, replays."""
+
+from __future__ import annotations
+
+import dataclasses
+import itertools
+import math
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+from support import rows
+
+from cavsumo.agents.base import Agent
+from cavsumo.bodies import Action
+from cavsumo.cli import main
+from cavsumo.commands.run import Manner, run
+from cavsumo.counterfactual import NOT_MONOTONE, Retrial, Verdict, Watch
+from cavsumo.egos import make_ego
+from cavsumo.egos.base import Ego
+from cavsumo.egos.takeover import Takeover
+from cavsumo.executors import Means
+from cavsumo.jobs import job
+from cavsumo.references import REFERENCES
+from cavsumo.report.analysis import analyse
+from cavsumo.roads import Start
+from cavsumo.scenario import BatchPlan
+from cavsumo.simulator import Performance, play
+from cavsumo.site import Site
+from cavsumo.stage import Stage, set_stage
+from cavsumo.theatre import Theatre
+
+LANE_Y, SPEED, WALK, DT = -1.825, 8.0, 1.4, 0.1
+HALF = 0.328125  # half the length of a pedestrian, half its width is 0.4375 [m]
+Staged = Callable[..., tuple[BatchPlan, Site]]
+Played = Callable[..., Retrial]
+
+
+@pytest.fixture
+def played(staged: Staged, monkeypatch: pytest.MonkeyPatch) -> Any:
+    """Call with a pedestrian's start: it keeps its velocity and meets an ego that keeps its own.
+
+    Returns the episode, ready to be tried again with other drivers.
+    """
+    open_stages: list[Stage] = []
+
+    def one(start: Start, ego: Ego | None = None, agent: Agent | None = None) -> Retrial:
+        plan, site = staged("pedestrians", testers=1, assertions=["collision"], end=20.0)
+        ego = ego or make_ego("constant", {"speed": SPEED})
+        monkeypatch.setattr(Site, "draw", lambda *_: (start,))
+        stage = set_stage(plan.scenario, site, ego)
+        open_stages.append(stage)
+        agents = [agent or Agent()]
+        episode = play(stage, agents, 1, keep=True)
+        assert episode.judgement.verdict == "violated"
+        return Retrial(stage, agents, 1, False, episode, lambda: None)
+
+    yield one
+    for stage in open_stages:
+        stage.close()
+
+
+def judged(retrial: Retrial, name: str) -> Verdict:
+    """The verdict of one reference driver."""
+    fresh = Retrial.__new__(Retrial)  # the assertion that was violated has been used since
+    for field in dataclasses.fields(Retrial):
+        object.__setattr__(fresh, field.name, getattr(retrial, field.name))
+    return fresh.judged(REFERENCES.make(name, {}))
+
+
+def standing(x: float = 60.0) -> Start:
+    """A pedestrian who stands in the ego's lane, facing along it."""
+    return Start(x, LANE_Y, 0.0, v=0.0)
+
+
+def walking_in(seconds: float, x: float = 60.0) -> Start:
+    """One who walks north and is in the middle of the lane after so many seconds."""
+    return Start(x, LANE_Y - WALK * seconds, math.pi / 2, v=WALK)
+
+
+def way_to_stop(name: str) -> float:
+    """The way from the perception to standstill, in closed form [m]."""
+    if name == "ideal":
+        return SPEED**2 / 18.0
+    if name == "rss":
+        return SPEED + SPEED**2 / 8.0
+    full = 0.774 * 9.80665
+    left = SPEED - 0.3 * full
+    return SPEED * 1.75 - full * 0.06 + left**2 / (2.0 * full)
+
+
+def test_the_last_chance_is_where_the_way_to_stop_ends_at_the_pedestrian(played: Played) -> None:
+    """Who stands in the lane can be seen from afar: preventable by all of them."""
+    retrial = played(standing())
+    hit = retrial.episode.frames[retrial.end]
+    for name in REFERENCES:
+        found = judged(retrial, name)
+        before = retrial.episode.frames[0].ego
+        contact = (60.0 - HALF - before.x - before.body.kind.length / 2) / SPEED
+        assert found.avoidable is True, name
+        assert found.note == ""
+        assert found.last_chance is not None
+        assert found.last_chance == pytest.approx(contact - way_to_stop(name) / SPEED, abs=2 * DT)
+        assert found.margin == pytest.approx(hit.time - found.last_chance)
+
+
+def test_whoever_steps_out_late_spares_only_the_fastest_driver(played: Played) -> None:
+    """Perceived as it leaves the kerb, 1.4 s ahead: enough for full braking, not for a human.
+
+    RSS, which knows no kerbs, calls the situation dangerous while it still walks on the pavement.
+    """
+    retrial = played(walking_in(7.1))
+    seen = {name: judged(retrial, name) for name in REFERENCES}
+    assert {name: v.avoidable for name, v in seen.items()} == {
+        "ideal": True,
+        "human": False,
+        "rss": True,
+    }
+    human = seen["human"]
+    assert human.last_chance is not None, "it would have had to know before the kerb"
+    end = retrial.episode.frames[retrial.end].time
+    kerb = next(f.time for f in retrial.episode.frames if f.testers[0].y > -3.65)
+    assert human.last_chance < kerb < end - 0.9
+
+
+def test_what_jumps_out_at_the_bumper_nobody_prevents(played: Played) -> None:
+    """A pedestrian who grows out of the ground under the bumper: no time for any driver."""
+    retrial = played(standing(9.0))
+    assert retrial.episode.frames[retrial.end].time < 1.0
+    assert judged(retrial, "human") == Verdict(False)
+    assert judged(retrial, "rss") == Verdict(False)
+
+
+def test_every_timestep_by_itself_gives_the_same_last_chance(played: Played) -> None:
+    """Takeovers avoid it up to the last chance and not after: the search may assume it here."""
+    retrial = played(walking_in(4.7, 40.0))
+    found = judged(retrial, "ideal")
+    assert found.last_chance is not None
+    last = round(found.last_chance / DT)
+    ideal = REFERENCES.make("ideal", {})
+    steps = range(0, retrial.end, 3)
+    assert [retrial._avoided(ideal, k) for k in steps] == [k <= last for k in steps]
+    assert NOT_MONOTONE not in found.note
+
+
+def test_the_testers_do_again_what_they_did(played: Played) -> None:
+    """A counterfactual changes the ego only: agents are not asked, and learn nothing."""
+
+    class Counting(Agent):
+        calls = 0
+
+        def choose_action(self, snapshot: Any) -> tuple[Action, ...]:
+            self.calls += 1
+            return (Action(0.0, 0.1),)  # walks on a circle
+
+    agent = Counting()
+    retrial = played(standing(40.0), agent=agent)
+    asked = agent.calls
+    assert judged(retrial, "ideal").avoidable is True
+    assert agent.calls == asked == retrial.episode.steps
+
+
+class Steering(Ego):
+    """Drives freely, straight on, and never brakes."""
+
+    depart_speed = SPEED
+
+    def act(self, snapshot: Any) -> Any:
+        from cavsumo.egos.base import Drive
+
+        return Drive(0.0, 0.0)
+
+
+def test_an_ego_that_steers_itself_is_taken_over_on_its_path(played: Played) -> None:
+    """The reference drives it by the same kinematics; the last chance is that of the others."""
+    retrial = played(standing(), ego=Steering())
+    assert retrial.episode.drives
+    found = judged(retrial, "ideal")
+    contact = retrial.episode.frames[retrial.end].time
+    assert found.margin == pytest.approx(way_to_stop("ideal") / SPEED, abs=2 * DT)
+    assert (found.avoidable, contact > 5.0) == (True, True)
+
+
+def test_an_ego_that_is_never_the_same_is_not_judged(played: Played) -> None:
+    """Its reruns part from the record, which is said, and no error."""
+
+    class Moody(Ego):
+        depart_speed = SPEED
+        lives = 0
+
+        def reset(self, scene: Any) -> None:
+            self.lives += 1
+
+        def act(self, snapshot: Any) -> Any:
+            from cavsumo.egos.base import Acceleration
+
+            return Acceleration(0.01 * self.lives)
+
+    found = judged(played(standing(), ego=Moody()), "human")
+    assert found.avoidable is None
+    assert found.note == "not judged: the episode again is another one: the ego differs at 0.10 s"
+
+
+def test_sumos_driver_obeys_from_the_takeover_on(staged: Staged) -> None:
+    """It drives as it likes before, reaction time and all; then every timestep is commanded."""
+    plan, site = staged("pedestrians", testers=1)
+    stage = set_stage(plan.scenario, site)
+    ego = Takeover(stage.ego, REFERENCES.make("ideal", {}), 23, drives=False)
+    with_it = dataclasses.replace(stage, ego=ego, assertions=(Watch(),))
+    try:
+        alone = _speeds(Performance(stage, [Agent()], 5), 40)
+        taken = _speeds(Performance(with_it, [Agent()], 5), 40)
+    finally:
+        stage.close()
+    assert taken[:24] == alone[:24]
+    assert min(alone[24:]) > 5.0
+    lost = [a - b for a, b in itertools.pairwise(taken[23:31])]
+    assert lost == pytest.approx([0.9] * 7)
+    assert taken[-1] == 0.0
+
+
+def _speeds(performance: Performance, steps: int) -> list[float]:
+    """The ego's speed at each timestep."""
+    speeds = [performance.snapshot.ego.v]
+    for _ in range(steps):
+        performance.step()
+        speeds.append(performance.snapshot.ego.v)
+    return speeds
+
+
+def test_a_standing_ego_is_not_judged(played: Played) -> None:
+    """References only brake, so nothing is said of a violation by standing."""
+    retrial = played(standing())
+    stood = [
+        f._replace(ego=f.ego._replace(v=0.0)) if f.step == retrial.end else f
+        for f in retrial.episode.frames
+    ]
+    episode = dataclasses.replace(retrial.episode, frames=stood)
+    object.__setattr__(retrial, "episode", episode)
+    assert judged(retrial, "human").note.startswith("not judged: the ego stood")
+
+
+# In batches
+
+BATCH: dict[str, Any] = {
+    "ego": "constant",
+    "ego_params": {"speed": 7.0},
+    "agents": ["timing"],
+    "routes": "none",
+    "runs": 4,
+    "reference": "ideal",
+}
+
+
+@pytest.fixture(scope="module")
+def batch(networks: dict[str, Path], tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Four episodes of an ego that never brakes, on the straight road."""
+    file = tmp_path_factory.mktemp("batch") / "results.csv"
+    settings = BATCH | {"net": networks["pedestrians"]}
+    run(settings, file, Means(), Manner(quiet=True, exit_zero=True))
+    return file
+
+
+def test_an_ideal_driver_prevents_what_an_ego_without_brakes_does(batch: Path) -> None:
+    """Tests of the reaction zone are those that an immediate brake passes."""
+    failures = [row for row in rows(batch) if row["outcome"] == "violated"]
+    assert len(failures) >= 3
+    assert {row["avoidable"] for row in failures} == {"1"}
+    for row in failures:
+        margin = float(row["violation_time_s"]) - float(row["last_chance_s"])
+        assert row["reference"] == "ideal"
+        assert float(row["margin_s"]) == pytest.approx(margin, abs=0.002)
+        assert 0.0 < margin < 2.0
+    for row in rows(batch):
+        if row["outcome"] != "violated":
+            assert {row["avoidable"], row["last_chance_s"], row["reference"]} == {""}
+
+
+def test_the_verdicts_do_not_depend_on_who_plays(
+    batch: Path, networks: dict[str, Path], tmp_path: Path
+) -> None:
+    """The same rows from two processes."""
+    settings = BATCH | {"net": networks["pedestrians"]}
+    file = tmp_path / "results.csv"
+    run(settings, file, Means(jobs=2), Manner(quiet=True, exit_zero=True))
+    assert rows(file) == rows(batch)
+
+
+def test_a_replay_finds_the_verdict_again(batch: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """From the results and from the trace alone."""
+    failure = next(row for row in rows(batch) if row["avoidable"] == "1")
+    assert main(["replay", str(batch), failure["run"]]) == 0
+    assert main(["replay", str(batch.parent / failure["trace"])]) == 0
+    assert capsys.readouterr().out.count(": the same") == 2
+
+
+def test_a_report_tells_the_share_of_preventable_failures(batch: Path) -> None:
+    """Among the failures that were judged."""
+    found = analyse([batch]).rates[0]
+    assert found.preventable.count == found.preventable.total == found.failures.count
+    assert found.preventable.intervals["Wilson"].high == pytest.approx(1.0)
+
+
+@pytest.mark.parametrize("trace", ["none", "tests"])
+def test_no_reference_leaves_the_rest_of_the_row_as_it_is(
+    staged: Staged, batch: Path, trace: str
+) -> None:
+    """The judgement costs nothing when it is off and changes nothing when it is on."""
+    plan, site = staged("pedestrians", **{**BATCH, "reference": "none", "trace": trace})
+    number = int(next(row for row in rows(batch) if row["avoidable"])["run"])
+    with Theatre(plan, site) as theatre:
+        without = theatre.play(job(plan, number))[0]
+    beats: list[int] = []
+    plan = plan.model_copy(update={"reference": "ideal"})
+    with Theatre(plan, site) as theatre:
+        with_it = theatre.play(job(plan, number), lambda: beats.append(1))[0]
+    for name in ("avoidable", "reference", "last_chance_s", "margin_s", "avoidable_note", "wall_s"):
+        with_it.row.pop(name, None)
+        without.row.pop(name, None)
+    assert with_it.row == without.row
+    assert bool(with_it.trace) == bool(without.trace) == (trace == "tests")
+    assert 2 <= len(beats) <= 10
+
+
+def test_the_summary_says_how_many_were_preventable(
+    networks: dict[str, Path], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """In the regulation's word, with the driver that is meant."""
+    words = ["run", "-n", str(networks["pedestrians"]), "-r", "none", "--ego", "constant"]
+    words += ["--runs", "1", "--reference", "human", "-o", str(tmp_path / "r.csv"), "--exit-zero"]
+    assert main(words) == 0
+    said = capsys.readouterr().out
+    row = rows(tmp_path / "r.csv")[0]
+    if row["outcome"] == "violated":
+        count = int(row["avoidable"])
+        assert f"1 failure, {count} of them preventable by a careful human driver (UN R157)" in said
+    else:
+        assert "preventable" not in said
+
+
+BLIND = r"""
+import json, sys
+for line in sys.stdin:
+    said = json.loads(line)
+    kind = said["type"]
+    if kind == "hello":
+        print(json.dumps({"type": "hello", "version": 1}), flush=True)
+    elif kind == "reset":
+        print("begun", file=sys.stderr, flush=True)
+        print(json.dumps({"type": "ready"}), flush=True)
+    elif kind == "close":
+        break
+    else:
+        print('{"acceleration": 0}', flush=True)
+"""
+
+
+def test_a_program_is_relieved_too(staged: Staged, tmp_path: Path) -> None:
+    """It is told to begin anew for each rerun; its log is that of the episode alone."""
+    (tmp_path / "blind.py").write_text(BLIND, encoding="utf-8")
+    ego = f"exec:{sys.executable} {tmp_path / 'blind.py'}"
+    plan, site = staged("pedestrians", **{**BATCH, "ego": ego, "ego_params": {"depart_speed": 7}})
+    with Theatre(plan, site) as theatre:
+        theatre.rehearse()
+        outcome = theatre.play(job(plan, 0))[0]
+    assert outcome.row["outcome"] == "violated", outcome.row.get("error")
+    assert (outcome.row["avoidable"], outcome.row["avoidable_note"]) == (1, "")
+    assert outcome.ego_log.count("begun") == 1
