@@ -1,7 +1,7 @@
 """A game laid out for solving it: goals dropped, states in the order in which values spread.
 
-States are renumbered from the goals outward (the layers of the attractor), because a value then
-depends mostly on values before it, and one Gauss-Seidel sweep carries news through the whole game.
+States are renumbered in the order in which values spread (``flow``), so that a value depends mostly
+on values before it and one Gauss-Seidel sweep carries news far.
 Each state has groups of cells, each group cells: in reading A the tester chooses the group (a
 row) and the ego the cell, in reading C the ego the group (its action) and the tester the cell.
 """
@@ -88,11 +88,9 @@ class Arena:
         return [_block(self, a, b) for a, b in zip(cuts, cuts[1:], strict=False)]
 
 
-def arena(game: Game, reading: Reading, layer: Ints, kept: Bools | None = None) -> Arena:
-    """Lay out the states with a positive layer, by layer, and their cells that are kept."""
+def arena(game: Game, reading: Reading, live: Ints, kept: Bools | None = None) -> Arena:
+    """Lay out states in the order given, with their cells, or those that are kept."""
     ego_first = reading is Reading.C
-    live = np.flatnonzero(layer > 0)
-    live = live[np.argsort(layer[live], kind="stable")]
     if ego_first:
         order, start, groups = game.replies
     else:

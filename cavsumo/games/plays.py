@@ -18,6 +18,9 @@ from cavsumo.games.pairs import pair_value
 from cavsumo.games.readings import Reading
 
 
+COMPILED = 200_000  # outcomes from which compiled loops are worth loading
+
+
 class Play(Protocol):
     """A game in one reading, ready to be solved."""
 
@@ -40,11 +43,11 @@ class Play(Protocol):
         """The ego's part."""
 
 
-def play_of(game: Game, reading: Reading, layer: Ints, kept: Bools | None) -> Play:
-    """A game in a reading."""
+def play_of(game: Game, reading: Reading, states: Ints, kept: Bools | None) -> Play:
+    """The states of a game, in the order of sweeps, in a reading."""
     if reading is Reading.B:
-        return Simultaneous(game, layer, kept)
-    return TurnBased(arena(game, reading, layer, kept))
+        return Simultaneous(game, states, kept)
+    return TurnBased(arena(game, reading, states, kept))
 
 
 def value_of(
@@ -64,6 +67,17 @@ def time_of(play: Play, pair: Any) -> Floats | None:
     return None if found is None or (found < 0.9).any() else np.append(found, 0.0)
 
 
+def _bellman(arena: Arena) -> Any:
+    """The module with the operator: compiled where numba is installed and it is worth it."""
+    if len(arena.successor) >= COMPILED:
+        try:
+            from cavsumo.games import kernel
+        except ImportError:
+            return backups
+        return kernel
+    return backups
+
+
 class TurnBased:
     """Readings A and C; a pair is the cell that is played in each state."""
 
@@ -71,14 +85,16 @@ class TurnBased:
 
     def __init__(self, arena: Arena) -> None:
         self.arena = arena
+        self._bellman = _bellman(arena)
 
     def sweep(self, value: Floats, shift: float) -> None:
         """See ``Play``."""
-        backups.sweep(self.arena, value, shift)
+        self._bellman.sweep(self.arena, value, shift)
 
     def backup(self, value: Floats) -> tuple[Floats, Ints]:
         """See ``Play``."""
-        return backups.backup(self.arena, value)
+        found: tuple[Floats, Ints] = self._bellman.backup(self.arena, value)
+        return found
 
     def system(self, pair: Ints) -> tuple[Any, Floats]:
         """See ``Play``."""
@@ -115,9 +131,9 @@ class Simultaneous:
 
     sweeps = 0  # a sweep costs as much as a backup: linear programs
 
-    def __init__(self, game: Game, layer: Ints, kept: Bools | None) -> None:
+    def __init__(self, game: Game, states: Ints, kept: Bools | None) -> None:
         game.replies  # every ego action is there against every tester action, or GameError
-        self.arena = arena(_sorted(game), Reading.A, layer, kept)
+        self.arena = arena(_sorted(game), Reading.A, states, kept)
         self._order = np.lexsort((game.ego_action, game.cell_row))
         a = self.arena
         many = np.diff(a.state_group)

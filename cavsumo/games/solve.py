@@ -24,6 +24,7 @@ import numpy as np
 
 from cavsumo.errors import CavsumoError
 from cavsumo.games.certificate import Certificate, holds, worth
+from cavsumo.games.flow import best_order
 from cavsumo.games.model import Bools, Floats, Game
 from cavsumo.games.plays import Play, play_of, time_of, value_of
 from cavsumo.games.readings import Reading
@@ -119,7 +120,9 @@ def solve(
         raise Unsolvable(game, verdict)
     inside = verdict.proper.inside
     kept = None if inside.all() else keeping(game, reading, inside)
-    play = play_of(game, reading, verdict.proper.layer, kept)
+    tell("in which order values spread", np.inf)
+    order = best_order(game, verdict.proper.layer, verdict.proper.moves)
+    play = play_of(game, reading, order, kept)
     if not play.arena.size:
         return Solution(verdict, _trivial(game, reading, inside), precision)
     value = _start(game, verdict, play, tell)
@@ -143,7 +146,7 @@ def _start(game: Game, verdict: Verdict, play: Play, tell: Tell) -> Floats:
     value = np.zeros(play.arena.size + 1)
     if verdict.reading is Reading.B:
         return value
-    first = play_of(game, verdict.reading, verdict.proper.layer, verdict.proper.moves)
+    first = play_of(game, verdict.reading, play.arena.states, verdict.proper.moves)
     value, *_ = _approach(first, value, 0.0, 0.1 * scale, "a first policy", tell, jumps=8)
     return value
 
