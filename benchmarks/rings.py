@@ -25,6 +25,23 @@ def two_pedestrians(length: int, gap: int) -> Game:
 
     State ((x * 3 + v - 1) * 5 + y1) * 5 + y2; tester action 3 (m1 + 1) + m2 + 1; ego action a + 1.
     """
+    successor, reward = _two(length, gap)
+    s = np.arange(length * 75)
+    lateral = (s // 5 % 5, s % 5)
+    crossed, reached = _zones(length, (0, gap), s // 75, s // 25 % 3 + 1, lateral)
+    chance = [(0.1 if k & 4 else 0.9) * (0.1 if k & 2 else 0.9) * (0.2 if k & 1 else 0.8)
+              for k in range(8)]  # fmt: skip
+    initial = ((length // 2 * 3 + 1) * 5) * 5  # the car half a round away at medium speed
+    return _game(reached & ~crossed, successor, np.array(chance), reward, initial)
+
+
+def successors_of_two(length: int, gap: int) -> Any:
+    """The successor of each state, pair of actions and chance event, shape (75 L, 9, 3, 8)."""
+    return _two(length, gap)[0]
+
+
+def _two(length: int, gap: int) -> tuple[Any, Any]:
+    """Successors and rewards of ``two_pedestrians``; bits of the chance event: who fails."""
     s, a1, a2, k = np.ix_(np.arange(length * 75), np.arange(9), np.arange(3), np.arange(8))
     x, v, y1, y2 = s // 75, s // 25 % 3 + 1, s // 5 % 5, s % 5
     moved_1 = np.where(k & 4, y1, np.clip(y1 + a1 // 3 - 1, 0, 4))
@@ -34,12 +51,7 @@ def two_pedestrians(length: int, gap: int) -> Game:
     late, _ = _zones(length, (0, gap), there[0], there[1], there[2:])
     reward = np.where(late, -25.0, -1.0 - _walking(there[2]) - _walking(there[3]))
     first, second = (np.where(late, 0, y) for y in there[2:])
-    successor = ((there[0] * 3 + there[1] - 1) * 5 + first) * 5 + second
-    flat = [part.ravel() for part in (x, v, y1, y2)]
-    crossed, reached = _zones(length, (0, gap), flat[0], flat[1], flat[2:])
-    chance = [(0.1 if k & 4 else 0.9) * (0.1 if k & 2 else 0.9) * (0.2 if k & 1 else 0.8)
-              for k in range(8)]  # fmt: skip
-    return _game(reached & ~crossed, successor, np.array(chance), reward, length * 37 + 37)
+    return ((there[0] * 3 + there[1] - 1) * 5 + first) * 5 + second, reward
 
 
 def one_pedestrian(length: int) -> Game:

@@ -51,4 +51,6 @@ def add_game(commands: Any) -> None:
 def _solve(options: argparse.Namespace) -> int:
     from cavsumo.commands.game import Order, solve_file
 
-    return solve_file(Order(**{f.name: getattr(options, f.name) for f in dataclasses.fields(Order)}))
+    return solve_file(
+        Order(**{f.name: getattr(options, f.name) for f in dataclasses.fields(Order)})
+    )

@@ -19,8 +19,8 @@ ORDER = """
     cavsumo errors checks registry
     games.model games.build games.files games.readings games.regions games.components
     games.solvable games.policies games.chains games.evaluation games.proper games.certificate
-    games.flow games.arena games.kernel games.backups games.matrix_games games.pairs games.plays games.solve
-    games games.drawing games.pictures
+    games.flow games.arena games.kernel games.backups games.matrix_games games.pairs games.plays
+    games.solve games games.drawing games.pictures
     kinematics geometry paths bodies snapshot fairness roads
     sumo_poses background
     network ego_routes lane_chains approaches starts vehicle_starts kerbs signals trips traffic

@@ -23,8 +23,8 @@ from cavsumo.games.files import read_game
 from cavsumo.games.model import Game
 from cavsumo.games.policies import ego_actions
 from cavsumo.games.readings import Reading
-from cavsumo.games.solve import NotCertified, Solution, Tell, Unsolvable, solve
 from cavsumo.games.solvable import Verdict
+from cavsumo.games.solve import NotCertified, Solution, Tell, Unsolvable, solve
 
 FORMAT = 1  # of the JSON; raised when a key changes its meaning or goes
 SHOWN = 60  # states in the table
@@ -100,7 +100,9 @@ def _painters(order: Order) -> list[tuple[Any, Path]]:
         if file is None:
             continue
         if file.suffix.lower() not in SUFFIXES:
-            raise InputError(f"{option} {str(file)!r}: expected a name ending in .png, .svg or .pdf")
+            raise InputError(
+                f"{option} {str(file)!r}: expected a name ending in .png, .svg or .pdf"
+            )
         if not file.parent.is_dir():
             raise InputError(f"{option} {str(file)!r}: no such folder {str(file.parent)!r}")
         try:

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import pairwise
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -85,7 +86,7 @@ class Arena:
         """The states in runs for sweeps."""
         length = max(BLOCK, self.size // 512)
         cuts = [*range(0, self.size, length), self.size]
-        return [_block(self, a, b) for a, b in zip(cuts, cuts[1:], strict=False)]
+        return [_block(self, a, b) for a, b in pairwise(cuts)]
 
 
 def arena(game: Game, reading: Reading, live: Ints, kept: Bools | None = None) -> Arena:

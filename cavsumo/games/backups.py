@@ -1,7 +1,7 @@
 """The Bellman operator of readings A and C, in numpy; values have a last entry 0 for the goals.
 
-    A:  (T V)(s) = max over a1 of min over a2 of  r + sum over s' of T(s, a1, a2, s') V(s')
-    C:  (T V)(s) = min over a2 of max over a1 of  the same
+A:  (T V)(s) = max over a1 of min over a2 of  r + sum over s' of T(s, a1, a2, s') V(s')
+C:  (T V)(s) = min over a2 of max over a1 of  the same
 """
 
 from __future__ import annotations
@@ -27,9 +27,7 @@ def _operators(arena: Arena) -> tuple[np.ufunc, np.ufunc]:
     return np.maximum, np.minimum
 
 
-def _swept(
-    arena: Arena, block: Block, value: Floats, outer: np.ufunc, inner: np.ufunc
-) -> Floats:
+def _swept(arena: Arena, block: Block, value: Floats, outer: np.ufunc, inner: np.ufunc) -> Floats:
     """New values of a block."""
     terms = arena.probability[block.outcomes] * value[arena.successor[block.outcomes]]
     q: Floats = np.add.reduceat(terms, block.cell_outcome)

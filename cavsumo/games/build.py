@@ -74,10 +74,11 @@ def from_arrays(
 
 def _check_nesting(goal: Any, rows: Ints, cells: Ints, outcomes: Ints, end: int) -> None:
     """Each level of the arrays covers the next."""
-    ends = (("row_start", rows, len(goal), len(cells) - 1),)
-    ends += (("cell_start", cells, int(rows[-1]), len(outcomes) - 1),)
-    ends += (("outcome_start", outcomes, int(cells[-1]), end),)
-    for key, start, length, last in ends:
+    for key, start, length, last in (
+        ("row_start", rows, len(goal), len(cells) - 1),
+        ("cell_start", cells, int(rows[-1]), len(outcomes) - 1),
+        ("outcome_start", outcomes, int(cells[-1]), end),
+    ):
         if len(start) != length + 1 or start[0] != 0 or start[-1] != last:
             raise GameError(f"{key}: expected {length + 1} numbers from 0 to {last}")
         if (np.diff(start) < 0).any():
@@ -120,6 +121,10 @@ def from_transitions(
             table[state, tester, ego] = merged
         elif set(merged) != {state} or merged[state][1] != 0:
             raise GameError(f"{place}: a goal is absorbing with reward 0")
+    served = goals | {state for state, *_ in table}
+    if len(served) < n_states:
+        idle = next(state for state in range(n_states) if state not in served)
+        raise GameError(f"state {idle}: expected at least one action, as it is no goal")
     return check(_from_table(n_states, goals, table, initial, name, labels))
 
 
@@ -139,9 +144,7 @@ def _merged(
             found[successor] = (before + p, sum_ + p * r)
     total = sum((p for p, _ in found.values()), Fraction(0))
     if abs(total - 1) > SUM_TOLERANCE:
-        raise GameError(
-            f"{place}: expected probabilities that sum to 1, got {float(total):.12g}"
-        )
+        raise GameError(f"{place}: expected probabilities that sum to 1, got {float(total):.12g}")
     return {s: (p / total, weighted / p) for s, (p, weighted) in found.items()}
 
 
@@ -150,10 +153,12 @@ def _rational(place: str, what: str, value: Any) -> Fraction:
     try:
         if isinstance(value, bool):
             raise TypeError
-        return Fraction(value)
+        number = Fraction(value)
+        float(number)  # too large: OverflowError
+        return number
     except (TypeError, ValueError, ZeroDivisionError, OverflowError):
         raise GameError(
-            f"{place}: expected a {what} such as 0.25 or \"1/4\", got {value!r}"
+            f'{place}: expected a {what} such as 0.25 or "1/4", got {value!r}'
         ) from None
 
 
@@ -170,9 +175,7 @@ def _from_table(
     rows = sorted({key[:2] for key in keys})
     outcomes = [(s, *table[key][s]) for key in keys for s in sorted(table[key])]
     sizes = [len(table[key]) for key in keys]
-    exact_reward = tuple(
-        sum((p * r for p, r in table[key].values()), Fraction(0)) for key in keys
-    )
+    exact_reward = tuple(sum((p * r for p, r in table[key].values()), Fraction(0)) for key in keys)
     goal = np.zeros(n_states, dtype=bool)
     goal[sorted(goals)] = True
     numbers = {row: i for i, row in enumerate(rows)}

@@ -1,7 +1,8 @@
 """Bounds on the value that can be checked without knowing how they were found.
 
-With V = 0 at goals and q(c) = r(c) + sum over s' of T(c, s') V(s') for each cell c, a *lower* bound
-L comes with a policy of the tester, an *upper* bound U with one of the ego, such that in every state
+With V = 0 at goals and q(c) = r(c) + sum over s' of T(c, s') V(s') for each cell c, a *lower*
+bound L comes with a policy of the tester, an *upper* bound U with one of the ego, such that in
+every state
 
     A:  q_L(c) >= L(s)  for every cell c of the tester's row;
         sum over c of ego(c) q_U(c) <= U(s)  for every row (the ego's reply to it)
@@ -20,6 +21,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from fractions import Fraction
+from itertools import pairwise
+from typing import Any
 
 import numpy as np
 
@@ -53,31 +56,25 @@ def holds(game: Game, certificate: Certificate) -> bool:
     kept = _kept(game, certificate)
     return (
         _policies(game, certificate, kept)
-        and lower_holds(game, certificate.reading, certificate.lower, certificate.tester, kept)
+        and lower_holds(game, certificate.reading, certificate.lower, certificate.tester)
         and upper_holds(game, certificate.reading, certificate.upper, certificate.ego, kept)
     )
 
 
-def lower_holds(
-    game: Game, reading: Reading, lower: Floats, tester: Floats, kept: Bools | None = None
-) -> bool:
+def lower_holds(game: Game, reading: Reading, lower: Floats, tester: Floats) -> bool:
     """Whether a lower bound is proven by a policy of the tester."""
     if not game.n_cells:
         return True
-    worst, error = worth(game, lower)
-    worst = worst - error
+    rise, error = rises(game, lower)
+    worst = rise - error
     if reading is Reading.A:
-        used = tester > 0
-        return bool((worst[used] >= lower[game.cell_state[used]]).all())
+        return bool((worst[tester > 0] >= 0).all())
     order, start, _ = game.replies
-    got, state = _mixed(tester[order], worst[order], start), game.cell_state[order[start[:-1]]]
-    inside = np.isfinite(lower[state])
-    return bool((got[inside] >= lower[state[inside]]).all())
+    inside = np.isfinite(lower[game.cell_state[order[start[:-1]]]])
+    return bool((_mixed(tester[order], worst[order], start)[inside] >= 0).all())
 
 
-def upper_holds(
-    game: Game, reading: Reading, upper: Floats, ego: Floats, kept: Bools | None = None
-) -> bool:
+def upper_holds(game: Game, reading: Reading, upper: Floats, ego: Floats, kept: Bools) -> bool:
     """Whether an upper bound is proven by a policy of the ego.
 
     Cells that are not ``kept`` may lead out of the region where goals can be forced; the ego can
@@ -85,38 +82,36 @@ def upper_holds(
     """
     if not game.n_cells:
         return True
-    best, error = worth(game, upper)
-    best = best + error
-    if kept is None:
-        kept = np.ones(game.n_cells, dtype=bool)
+    rise, error = rises(game, upper)
+    best = rise + error
     if reading is Reading.C:
-        used = (ego > 0) & kept
-        return bool((best[used] <= upper[game.cell_state[used]]).all())
-    got = -_mixed(ego, -best, game.cell_start)
-    rows = kept[game.cell_start[:-1]]
-    return bool((got[rows] <= upper[game.row_state[rows]]).all())
+        return bool((best[(ego > 0) & kept] <= 0).all())
+    return bool((_mixed(ego, -best, game.cell_start)[kept[game.cell_start[:-1]]] >= 0).all())
 
 
-def worth(game: Game, value: Floats) -> tuple[Floats, Floats]:
-    """q of every cell, and a bound on its rounding error.
+def rises(game: Game, value: Floats) -> tuple[Floats, Floats]:
+    """q(c) - V(s) of every cell, and a bound on its rounding error.
 
-    A sum of k products misses by at most (k + 1) half-units of the last place of its terms, the
-    probabilities and rewards themselves by one each, their sum by k; half of epsilon is one unit.
+    Computed as r + sum of p (V(s') - V(s)), so that errors are as small as these differences. A sum
+    of k products misses by at most k half-units of the last place of its terms (half of epsilon
+    each), every term by three (p, the difference, the product), probabilities that do not quite
+    sum to 1 by k more.
     """
     finite = np.where(np.isfinite(value), value, 0.0)
-    q = game.matrix @ finite + game.reward
-    terms = game.matrix @ np.abs(finite) if (finite > 0).any() else -(game.matrix @ finite)
     widest = np.diff(game.outcome_start)
-    error = EPSILON * ((widest + 4) * (terms + np.abs(game.reward)) + 2.0 * magnitude(game))
-    return q, error
+    here = np.repeat(finite[game.cell_state], widest)
+    terms = game.probability * (finite[game.successor] - here)
+    rise = np.add.reduceat(terms, game.outcome_start[:-1]) + game.reward
+    size = np.add.reduceat(np.abs(terms), game.outcome_start[:-1]) + np.abs(game.reward)
+    return rise, EPSILON * ((widest + 4) * size + 2.0 * magnitude(game))
 
 
-def _mixed(weights: Floats, q: Floats, start: Ints) -> Floats:
-    """Sums of weights times q over the parts, lowered by what rounding may have added."""
-    product = np.where(weights > 0, weights * q, 0.0)
+def _mixed(weights: Floats, gain: Floats, start: Ints) -> Floats:
+    """Sums of weights times gains over the parts, lowered by what rounding may have added."""
+    product = np.where(weights > 0, weights * gain, 0.0)
     total = np.add.reduceat(product, start[:-1])
-    room = (2 * np.diff(start) + 70) * EPSILON * np.add.reduceat(np.abs(product), start[:-1])
-    return total - np.where((np.maximum.reduceat(weights, start[:-1]) == 1.0), 0.0, room)
+    room = (np.diff(start) + 4) * EPSILON * np.add.reduceat(np.abs(product), start[:-1])
+    return total - np.where(np.maximum.reduceat(weights, start[:-1]) == 1.0, 0.0, room)
 
 
 def _kept(game: Game, certificate: Certificate) -> Bools:
@@ -159,7 +154,7 @@ def _by_row(game: Game, tester: Floats, inside: Bools) -> bool:
 
 def _by_group(game: Game, ego: Floats, inside: Bools) -> bool:
     """The ego's weights are those of its actions and sum to 1 in each state."""
-    order, start, groups = game.replies
+    order, start, _ = game.replies
     weights = ego[order[start[:-1]]]
     state = game.cell_state[order[start[:-1]]]
     total = np.bincount(state, weights, game.n_states)
@@ -167,7 +162,7 @@ def _by_group(game: Game, ego: Floats, inside: Bools) -> bool:
     return bool(same) and _one(total[inside & ~game.goal])
 
 
-def _one(sums: Floats) -> bool:
+def _one(sums: Any) -> bool:
     """All are 1, but for rounding; the checks treat them as divided by their sum."""
     return bool((np.abs(sums - 1.0) <= 64 * EPSILON).all())
 
@@ -185,10 +180,10 @@ def holds_exactly(game: Game, certificate: Certificate) -> bool:
         return False
     reading = certificate.reading
     low, high = _exact_worth(game, certificate.lower), _exact_worth(game, certificate.upper)
-    by_row = [np.arange(a, b) for a, b in zip(game.cell_start, game.cell_start[1:], strict=False)]
+    by_row = [np.arange(a, b) for a, b in pairwise(game.cell_start)]
     if reading is not Reading.A:
         order, start, _ = game.replies
-        by_group = [order[a:b] for a, b in zip(start, start[1:], strict=False)]
+        by_group = [order[a:b] for a, b in pairwise(start)]
     single = [np.array([c]) for c in range(game.n_cells)]
     testers = single if reading is Reading.A else by_group
     egos = single if reading is Reading.C else by_row
@@ -208,7 +203,9 @@ def _judged(
     """The parts in which a policy plays and the bound is finite, each with its state."""
     found = [(cells, int(game.cell_state[cells[0]])) for cells in parts]
     return [
-        (cells, state) for cells, state in found if (weights[cells] > 0).any() and bound[state] > -np.inf
+        (cells, state)
+        for cells, state in found
+        if (weights[cells] > 0).any() and bound[state] > -np.inf
     ]
 
 

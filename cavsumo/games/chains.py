@@ -15,8 +15,6 @@ from fractions import Fraction
 from typing import NamedTuple
 
 import numpy as np
-from scipy.sparse import csr_matrix
-from scipy.sparse.csgraph import connected_components
 
 Number = Fraction | float
 TOLERANCE = 1e-11  # relative, by which floats count as 0
@@ -52,11 +50,12 @@ def values(chain: Chain, exact: bool) -> list[Number | None]:
     finite = [s for s in range(n) if s not in up | down | none | settled]
     for state in up ^ down:
         found[state] = math.inf if state in up else -math.inf
-    known = {s: found[s] for s in settled}
+    known = {s: number for s in settled if (number := found[s]) is not None}
     solved = _solve(
         [{s: p for s, p in chain.rows[i].items() if s not in known} for i in finite],
         [
-            chain.reward[i] + sum((p * known[s] for s, p in chain.rows[i].items() if s in known), Fraction(0))  # type: ignore[operator, misc]
+            chain.reward[i]
+            + sum((p * known[s] for s, p in chain.rows[i].items() if s in known), Fraction(0))
             for i in finite
         ],
         finite,
@@ -69,6 +68,9 @@ def values(chain: Chain, exact: bool) -> list[Number | None]:
 
 def _recurrent(chain: Chain) -> list[list[int]]:
     """The recurrent classes that are no goals."""
+    from scipy.sparse import csr_matrix
+    from scipy.sparse.csgraph import connected_components
+
     n = len(chain.rows)
     edges = [(s, t) for s, row in enumerate(chain.rows) for t, p in row.items() if p]
     source, target = np.array(edges, dtype=np.int64).reshape(-1, 2).T
@@ -109,7 +111,7 @@ def _class_values(
     phases = _phases(chain, members)
     earned = [Fraction(0)] * (max(phases) + 1)
     for state, weight, phase in zip(members, weights, phases, strict=True):
-        earned[phase] += weight * chain.reward[state]  # type: ignore[assignment, operator]
+        earned[phase] += weight * chain.reward[state]  # type: ignore[assignment]
     scale = max(abs(float(chain.reward[s])) for s in members)
     mean = sum(earned)
     if not _zero(mean, scale, exact):
@@ -124,8 +126,8 @@ def _class_values(
         exact,
     )
     shape: list[Number] = [Fraction(0), *relative]
-    offset = sum((w * v for w, v in zip(weights, shape, strict=True)), Fraction(0))  # type: ignore[operator, misc]
-    return [value - offset for value in shape]  # type: ignore[operator]
+    offset = sum((w * v for w, v in zip(weights, shape, strict=True)), Fraction(0))
+    return [value - offset for value in shape]
 
 
 def _zero(number: Number, scale: float, exact: bool) -> bool:
@@ -142,12 +144,12 @@ def _stationary(chain: Chain, members: list[int], exact: bool) -> list[Number]:
             if successor == first:
                 continue
             if state == first:
-                start[successor] += p  # type: ignore[operator]
+                start[successor] += p
             else:
                 into[successor][state] = p
     visits = [Fraction(1), *_solve([into[s] for s in rest], list(start.values()), rest, exact)]
-    total = sum(visits, Fraction(0))  # type: ignore[arg-type]
-    return [visit / total for visit in visits]  # type: ignore[operator]
+    total = sum(visits, Fraction(0))
+    return [visit / total for visit in visits]
 
 
 def _phases(chain: Chain, members: list[int]) -> list[int]:
@@ -175,14 +177,18 @@ def _solve(
         return []
     if exact:
         return _eliminate([{place[s]: p for s, p in row.items()} for row in rows], list(right))
-    from scipy.sparse import identity
+    from scipy.sparse import csr_matrix, identity
     from scipy.sparse.linalg import splu
 
     n = len(names)
     entries = [(i, place[s], float(p)) for i, row in enumerate(rows) for s, p in row.items()]
-    i, j, p = (np.array(column) for column in zip(*entries, strict=True)) if entries else ([], [], [])
+    i, j, p = (
+        (np.array(column) for column in zip(*entries, strict=True)) if entries else ([], [], [])
+    )
     system = identity(n, format="csc") - csr_matrix((p, (i, j)), shape=(n, n)).tocsc()
-    solution: list[Number] = splu(system.tocsc()).solve(np.array([float(b) for b in right])).tolist()
+    solution: list[Number] = (
+        splu(system.tocsc()).solve(np.array([float(b) for b in right])).tolist()
+    )
     return solution
 
 
@@ -196,7 +202,7 @@ def _eliminate(rows: list[dict[int, Number]], right: list[Number]) -> list[Numbe
         for i in range(n):
             factor = rows[i].pop(k, None) if i != k else None
             if factor:
-                right[i] += factor * right[k]  # type: ignore[operator]
+                right[i] += factor * right[k]
                 for j, p in rows[k].items():
-                    rows[i][j] = rows[i].get(j, Fraction(0)) + factor * p  # type: ignore[operator]
+                    rows[i][j] = rows[i].get(j, Fraction(0)) + factor * p
     return right

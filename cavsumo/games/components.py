@@ -135,7 +135,7 @@ def magnitude(game: Game) -> Floats:
     each = game.outcome_reward
     if each is None or game.exact is not None or not game.n_cells:
         return np.abs(game.reward)
-    terms = np.add.reduceat(game.probability * np.abs(each), game.outcome_start[:-1])
+    terms: Floats = np.add.reduceat(game.probability * np.abs(each), game.outcome_start[:-1])
     return terms * (1.0 + np.diff(game.outcome_start))  # the sum was rounded at each term
 
 
@@ -144,4 +144,5 @@ def _rounding(game: Game, component: EndComponent, part: Any, potential: Floats)
     terms = part @ np.abs(potential) + np.abs(potential[_own(game, component)])
     terms = terms + np.abs(game.reward[component.cells])
     widest = int(np.diff(game.outcome_start).max())
-    return (2 * widest + 8) * EPSILON * terms + _reward_error(game, component.cells)
+    error: Floats = (2 * widest + 8) * EPSILON * terms + _reward_error(game, component.cells)
+    return error

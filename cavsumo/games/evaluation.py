@@ -9,7 +9,7 @@ Finite horizons take any policy; only stationary ones have an infinite horizon h
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection
+from collections.abc import Callable, Collection, Iterable, Iterator
 from fractions import Fraction
 
 import numpy as np
@@ -83,7 +83,7 @@ def least_reach_probability(
             a1 = int(game.tester_action[row])
             for cell in game.cells(row) if strategy.get(a1) else ():
                 a2 = int(game.ego_action[cell])
-                against[a2] += strategy[a1] * _mean(game, cell, (a1, a2), later)  # type: ignore[operator]
+                against[a2] += strategy[a1] * _mean(game, cell, (a1, a2), later)
         return min(against.values())
 
     return _unfold(game, (tester,), fold, _arrived(goals), steps, start)
@@ -104,15 +104,17 @@ def stationary_values(
         reward: Number = Fraction(0)
         if not game.goal[state]:
             for cell, _, weight in _joint(game, History((state,)), tester, ego):
-                reward += weight * _reward(game, cell)  # type: ignore[operator]
+                reward += weight * _reward(game, cell)
                 for successor, p in _outcomes(game, cell):
-                    row[successor] = row.get(successor, Fraction(0)) + weight * p  # type: ignore[operator]
+                    row[successor] = row.get(successor, Fraction(0)) + weight * p
         rows.append(row)
         rewards.append(reward)
     return values(Chain(rows, rewards), exact)
 
 
-def _joint(game: Game, history: History, tester: Policy, ego: Policy):  # type: ignore[no-untyped-def]
+def _joint(
+    game: Game, history: History, tester: Policy, ego: Policy
+) -> Iterator[tuple[int, tuple[int, int], Number]]:
     """The cells that are played after a history."""
     return joint(game, history.state, tester.strategy(history), ego.strategy(history))
 
@@ -130,13 +132,16 @@ def _reward(game: Game, cell: int) -> Number:
 
 
 def _mean(
-    game: Game, cell: int, profile: tuple[int, int], later: Callable[[int, int, tuple[int, int]], Number]
+    game: Game,
+    cell: int,
+    profile: tuple[int, int],
+    later: Callable[[int, int, tuple[int, int]], Number],
 ) -> Number:
     """The mean of what comes later over the outcomes of a cell."""
     return _sum(p * later(cell, s, profile) for s, p in _outcomes(game, cell))
 
 
-def _sum(numbers) -> Number:  # type: ignore[no-untyped-def]
+def _sum(numbers: Iterable[Number]) -> Number:
     return sum(numbers, Fraction(0))
 
 
@@ -193,12 +198,13 @@ def _backwards(
 
     numbers: list[Number] = [known or Fraction(0) for known in all_known(0)]
     for left in range(1, steps + 1):
-        length = history.step + steps - left
-        before = numbers
+        length, before = history.step + steps - left, numbers
+
+        def later(_: int, state: int, __: tuple[int, int], then: list[Number] = before) -> Number:
+            return then[state]
+
         numbers = [
-            fold(History((state,) * length), lambda _, s, __, then=before: then[s])  # type: ignore[misc]
-            if known is None
-            else known
+            fold(History((state,) * length), later) if known is None else known
             for state, known in enumerate(all_known(left))
         ]
     return numbers[history.state]

@@ -21,7 +21,7 @@ WORTH_IT = 2000  # states from which a choice is made
 def best_order(game: Game, layer: Ints, moves: Bools) -> Ints:
     """The states with a positive layer, in the order in which to sweep them."""
     live = np.flatnonzero(layer > 0)
-    by_layer = live[np.argsort(layer[live], kind="stable")]
+    by_layer: Ints = live[np.argsort(layer[live], kind="stable")]
     if len(live) < WORTH_IT:
         return by_layer
     cells = np.flatnonzero(moves)
@@ -31,7 +31,8 @@ def best_order(game: Game, layer: Ints, moves: Bools) -> Ints:
     place[live] = np.arange(len(live))
     orders = [place[by_layer], np.arange(len(live))[::-1], np.arange(len(live))]
     orders.append(_deepest_first(matrix, int(place[by_layer[-1]])))
-    return live[max(orders, key=lambda order: _reached(matrix, order))]
+    best: Ints = live[max(orders, key=lambda order: _reached(matrix, order))]
+    return best
 
 
 def _deepest_first(matrix: Any, root: int) -> Ints:

@@ -21,7 +21,7 @@ def sweep(arena: Arena, value: Floats, shift: float) -> None:
     _sweep(*_parts(arena), value, shift)
 
 
-@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+@njit(cache=True, nogil=True)
 def _sweep(sign, states, groups, cells, successor, probability, reward, value, shift):  # type: ignore[no-untyped-def]
     """``sign`` is 1 where groups are maximised and their cells minimised, -1 the other way."""
     for s in range(len(states) - 1):
@@ -60,7 +60,7 @@ def backup(arena: Arena, value: Floats) -> tuple[Floats, Ints]:
     return best, chosen
 
 
-@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+@njit(cache=True, nogil=True)
 def _backup(sign, states, groups, cells, successor, probability, reward, value, out, chosen):  # type: ignore[no-untyped-def]
     """As ``_sweep``, into ``out``, noting the cells."""
     for s in range(len(states) - 1):

@@ -77,7 +77,10 @@ def _program(matrix: Floats) -> tuple[float, Floats, Floats]:
         b_eq=[1.0],
         bounds=[(0.0, None)] * many + [(None, None)],
         method="highs",
-        options={"primal_feasibility_tolerance": TOLERANCE, "dual_feasibility_tolerance": TOLERANCE},
+        options={
+            "primal_feasibility_tolerance": TOLERANCE,
+            "dual_feasibility_tolerance": TOLERANCE,
+        },
     )
     rows, columns = _distribution(found.x[:many]), _distribution(-found.ineqlin.marginals)
     return float(rows @ matrix @ columns), rows, columns

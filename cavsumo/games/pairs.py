@@ -15,7 +15,8 @@ import numpy as np
 from cavsumo.games.model import Floats
 
 DIRECT = 1500  # states up to which systems are factorised
-ROUNDS, ITERATIONS = 6, 120
+FALLBACK = 5000  # states up to which they are where the iteration fails
+ROUNDS, ITERATIONS = 4, 80
 
 
 def pair_value(
@@ -39,8 +40,11 @@ def pair_value(
     with warnings.catch_warnings(), np.errstate(all="ignore"):
         warnings.simplefilter("ignore")  # singular systems are answered below
         try:
-            solve = _factorised(system) if len(reward) <= DIRECT else _krylov(system)
-            return _refined(system, reward, start, residual, precise, solve)
+            if len(reward) > DIRECT:
+                found = _refined(system, reward, start, residual, precise, _krylov(system))
+                if found is not None or len(reward) > FALLBACK:
+                    return found
+            return _refined(system, reward, start, residual, precise, _factorised(system))
         except RuntimeError:  # SuperLU: exactly singular
             return None
 
@@ -52,16 +56,17 @@ def _refined(
     value, left = start, reward - system @ start
     size = float(np.abs(left).max(initial=0.0))
     first, wanted = size, residual if precise else max(residual, 1e-2 * size)
-    for _ in range(ROUNDS):
+    for attempt in range(ROUNDS):
         if size <= wanted:
             break
-        corrected = value + solve(left, wanted)
+        corrected = value + solve(left, 0.3**attempt * wanted)
         left_now = reward - system @ corrected
         size_now = float(np.abs(left_now).max())
         if not size_now < 0.9 * size:
             break
         value, left, size = corrected, left_now, size_now
-    return value if size <= max(wanted, 0.2 * first) else None
+    noise = 16.0 * np.finfo(float).eps * float(np.abs(value).max(initial=0.0))
+    return value if size <= max(wanted, noise, 0.2 * first) else None
 
 
 def _factorised(system: Any) -> Any:
@@ -77,10 +82,12 @@ def _krylov(system: Any) -> Any:
 
     triangle = splu(tril(system, format="csc"), permc_spec="NATURAL", diag_pivot_thresh=0.0)
     sweep = LinearOperator(system.shape, triangle.solve)
+    norm = 0.3 * np.sqrt(system.shape[0])  # of a vector whose entries are all about 0.3
 
     def solve(left: Floats, wanted: float) -> Floats:
+        enough = min(norm * wanted, 0.05 * float(np.linalg.norm(left)))
         found: Floats
-        found, _ = bicgstab(system, left, rtol=0.0, atol=wanted, maxiter=ITERATIONS, M=sweep)
+        found, _ = bicgstab(system, left, rtol=0.0, atol=enough, maxiter=ITERATIONS, M=sweep)
         return found
 
     return solve

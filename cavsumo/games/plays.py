@@ -6,6 +6,7 @@ pair of policies is differs. Values have a last entry, 0, for the goals.
 
 from __future__ import annotations
 
+import dataclasses
 from typing import Any, Protocol
 
 import numpy as np
@@ -16,7 +17,7 @@ from cavsumo.games.matrix_games import solve
 from cavsumo.games.model import Bools, Floats, Game, Ints
 from cavsumo.games.pairs import pair_value
 from cavsumo.games.readings import Reading
-
+from cavsumo.games.regions import spans
 
 COMPILED = 200_000  # outcomes from which compiled loops are worth loading
 
@@ -123,7 +124,8 @@ class TurnBased:
         """Whoever moves first: all cells that share the key with the state's cell."""
         chosen = np.full(game.n_states, np.iinfo(np.int64).min)
         chosen[self.arena.states] = key[self.arena.cells[pair]]
-        return (key == chosen[game.cell_state]).astype(float)
+        weights: Floats = (key == chosen[game.cell_state]).astype(float)
+        return weights
 
 
 class Simultaneous:
@@ -132,7 +134,7 @@ class Simultaneous:
     sweeps = 0  # a sweep costs as much as a backup: linear programs
 
     def __init__(self, game: Game, states: Ints, kept: Bools | None) -> None:
-        game.replies  # every ego action is there against every tester action, or GameError
+        _ = game.replies  # every ego action is there against every tester action, or GameError
         self.arena = arena(_sorted(game), Reading.A, states, kept)
         self._order = np.lexsort((game.ego_action, game.cell_row))
         a = self.arena
@@ -197,10 +199,6 @@ class Simultaneous:
 
 def _sorted(game: Game) -> Game:
     """The game with the cells of each row in the order of the ego's actions."""
-    import dataclasses
-
-    from cavsumo.games.regions import spans
-
     order = np.lexsort((game.ego_action, game.cell_row))
     if (order == np.arange(game.n_cells)).all():
         return game

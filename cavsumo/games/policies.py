@@ -141,7 +141,7 @@ def joint(
         for cell in game.cells(row) if tester.get(a1) else ():
             a2 = int(game.ego_action[cell])
             if ego.get(a2):
-                yield cell, (a1, a2), tester[a1] * ego[a2]  # type: ignore[operator]
+                yield cell, (a1, a2), tester[a1] * ego[a2]
 
 
 def check_strategy(what: str, strategy: Strategy, actions: Sequence[int]) -> None:
@@ -234,11 +234,10 @@ def execute(
     steps: int = 10_000,
 ) -> Execution:
     """Play from a state (default: the initial one) to a goal, for at most ``steps`` steps."""
-    history, rewards = History((game.initial if start is None else start,)), []
+    history = History((game.initial if start is None else start,))
+    rewards: list[float] = []
     while not game.goal[history.state] and len(rewards) < steps:
-        played = list(
-            joint(game, history.state, tester.strategy(history), ego.strategy(history))
-        )
+        played = list(joint(game, history.state, tester.strategy(history), ego.strategy(history)))
         cell, profile, _ = played[_draw(rng, [float(p) for *_, p in played])]
         outcomes = list(game.outcomes(cell))
         state, _, reward = outcomes[_draw(rng, [p for _, p, _ in outcomes])]

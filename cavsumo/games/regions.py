@@ -69,10 +69,11 @@ def almost_sure_region(game: Game, reading: Reading = Reading.A) -> Region:
 
 def keeping(game: Game, reading: Reading, inside: Bools) -> Bools:
     """The cells that the tester may use to stay inside, whatever the ego does."""
-    kept = inside[game.cell_state] & (game.matrix @ (~inside).astype(float) == 0)
+    kept: Bools = inside[game.cell_state] & (game.matrix @ (~inside).astype(float) == 0)
     if reading is Reading.C or not game.n_rows:
         return kept
-    return np.logical_and.reduceat(kept, game.cell_start[:-1])[game.cell_row]
+    whole: Bools = np.logical_and.reduceat(kept, game.cell_start[:-1])[game.cell_row]
+    return whole
 
 
 def spans(start: Ints, which: Ints) -> Ints:
@@ -80,7 +81,8 @@ def spans(start: Ints, which: Ints) -> Ints:
     begin, length = start[which], start[which + 1] - start[which]
     ends = np.cumsum(length)
     total = int(ends[-1]) if len(ends) else 0
-    return np.arange(total) + np.repeat(begin - ends + length, length)
+    found: Ints = np.arange(total) + np.repeat(begin - ends + length, length)
+    return found
 
 
 def _attract(game: Game, ego_first: bool, allowed: Bools, sure: bool) -> tuple[Ints, Bools]:

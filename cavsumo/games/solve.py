@@ -23,7 +23,8 @@ from typing import Any
 import numpy as np
 
 from cavsumo.errors import CavsumoError
-from cavsumo.games.certificate import Certificate, holds, worth
+from cavsumo.games.certificate import Certificate, holds, rises
+from cavsumo.games.components import EPSILON
 from cavsumo.games.flow import best_order
 from cavsumo.games.model import Bools, Floats, Game
 from cavsumo.games.plays import Play, play_of, time_of, value_of
@@ -35,6 +36,7 @@ PRECISION = 1e-6
 JUMPS = 400  # to the value of a pair, at most, in each of the three solutions
 SWEEPS = 512  # between two jumps, at most
 ATTEMPTS = 12  # at a certificate
+NEAR = 100.0  # times the residual wanted, within which there are only jumps
 Tell = Callable[[str, float], None]  # called with what is being done and the residual
 
 
@@ -161,7 +163,7 @@ def _certified(
     steps = np.append(np.ones(play.arena.size), 0.0) if time is None else time
     best, e = None, precision / (3.0 * float(steps.max()))
     for _ in range(ATTEMPTS):
-        e = max(e, 6.0 * _rounding(game, play, value))
+        e = max(e, _coarseness(game, play, value))
         found = _bounds(game, verdict, play, value, steps, e, tell)
         width = _width(found) if holds(game, found) else np.inf
         if width <= precision:
@@ -182,12 +184,12 @@ def _width(found: Certificate) -> float:
     return float((found.upper[inside] - found.lower[inside]).max(initial=0.0))
 
 
-def _rounding(game: Game, play: Play, value: Floats) -> float:
-    """The largest rounding error that the check of a certificate allows for."""
+def _coarseness(game: Game, play: Play, value: Floats) -> float:
+    """The least e for which bounds can be found and proven: some units of the last place."""
     whole = np.zeros(game.n_states)
     whole[play.arena.states] = value[:-1]
-    _, error = worth(game, whole)
-    return float(error.max(initial=0.0))
+    _, error = rises(game, whole)
+    return 4.0 * float(error.max(initial=0.0)) + 24.0 * EPSILON * float(np.abs(value).max())
 
 
 def _bounds(
@@ -236,15 +238,16 @@ def _approach(
         stuck = 0 if left < 0.5 * best[2] else stuck + 1
         if left < best[2] or best[1] is None:
             best = (value.copy(), pair, left)
-        if left <= residual:
+        if left <= residual or (stuck > 6 and left <= 3.0 * residual):
             break
         jump = value_of(play, pair, backed_up, shift, 0.25 * residual, _same(pair, before))
         before = pair
         if jump is None or stuck > 15:
             sweeps, stuck = min(SWEEPS, max(1, 2 * sweeps)), 0
         value = backed_up if jump is None else jump
-        for _ in range(sweeps):
-            play.sweep(value, shift)
+        if jump is None or left > NEAR * residual:  # a sweep adds up rounding errors on its way
+            for _ in range(sweeps):
+                play.sweep(value, shift)
     return best
 
 
