@@ -6,15 +6,19 @@ MDPs are those of ``rings.one_pedestrian`` (15 states a column), games those of
 ``rings.two_pedestrians`` (75 states a column). cavsumo's seconds include everything after the
 arrays are there: regions, solvability, order, bounds and their check; Storm's are its model
 checking without building the model. Storm has no solver for these games that answers through
-Python, so it gets the MDPs alone. Compiled loops are loaded before the clock starts.
+Python, so it gets the MDPs alone. Both have one thread. Compiled loops are loaded before the clock
+starts.
 """
 
 from __future__ import annotations
 
 import argparse
 import importlib.util
+import os
 import time
 from typing import Any
+
+os.environ["OPENBLAS_NUM_THREADS"] = "1"  # one thread, as Storm; read when numpy is loaded
 
 import numpy as np
 import rings

@@ -164,7 +164,7 @@ def test_storm_agrees_on_random_mdps(seed: int) -> None:
 @pytest.mark.parametrize("reading", [Reading.A, Reading.C])
 @pytest.mark.parametrize("seed", range(3))
 def test_storm_agrees_on_random_games(seed: int, reading: Reading) -> None:
-    """With a policy of the certificate fixed the game is an MDP; both have the value of the game."""
+    """With a policy of the certificate fixed the game is an MDP, which has the game's value."""
     bridge = storm()
     game = random_game(np.random.default_rng(100 + seed), 300, 2, 3)
     found = solve(game, reading)
