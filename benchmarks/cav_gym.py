@@ -14,6 +14,7 @@ zone arrives there. It is a grid over straight ways, not a proof for all others.
 from __future__ import annotations
 
 import argparse
+import csv
 import math
 from pathlib import Path
 
@@ -49,21 +50,7 @@ SETTINGS = {
     "params": {"rate_per_s": 0.603, "election.rule": "unsigned"},
 }
 AGENTS = ("random", "programmed-random", "proximity", "election")
-# CAV-Gym: interesting % with 95 % Wilson interval, and wasted episodes of 250.
-CAV_GYM = {
-    ("random", 1): (2.0, 0.9, 4.6, 3),
-    ("programmed-random", 1): (28.0, 22.8, 33.9, 36),
-    ("proximity", 1): (30.4, 25.0, 36.4, 59),
-    ("election", 1): (30.4, 25.0, 36.4, 59),
-    ("random", 3): (10.4, 7.2, 14.8, 12),
-    ("programmed-random", 3): (45.2, 39.1, 51.4, 63),
-    ("proximity", 3): (50.4, 44.2, 56.5, 91),
-    ("election", 3): (29.6, 24.3, 35.5, 58),
-    ("random", 6): (19.6, 15.2, 25.0, 16),
-    ("programmed-random", 6): (53.6, 47.4, 59.7, 98),
-    ("proximity", 6): (54.4, 48.2, 60.5, 110),
-    ("election", 6): (20.4, 15.9, 25.8, 71),
-}
+THEIRS = {"programmed-random": "constrained random"}  # where they call it otherwise
 
 
 def main() -> None:
@@ -80,6 +67,7 @@ def main() -> None:
 
 def compare(runs: int) -> None:
     """The four testers beside CAV-Gym's."""
+    measured = cav_gym()
     print(f"{'tester':18}  n  {'cavsumo, 95 %':>22}   unfair  {'CAV-Gym, 95 %':>22}  overlap")
     for testers in (1, 3, 6):
         rows = play(testers, AGENTS, runs)
@@ -87,12 +75,26 @@ def compare(runs: int) -> None:
             mine = [r for r in rows if r["agent"] == agent]
             found = tallied(mine).rate("tests")
             unfair = sum(r["outcome"] == "unfair" for r in mine)
-            theirs, low, high, _ = CAV_GYM[agent, testers]
+            theirs, low, high = measured[THEIRS.get(agent, agent), testers]
             print(
                 f"{agent:18} {testers:2}  {percent(found.value):>7} {interval(found):>14}  "
                 f"{unfair:3}/{runs}  {theirs:6.1f} %  {f'[{low:.1f}, {high:.1f}]':>13}  "
                 f"{'yes' if found.overlaps(low / 100, high / 100) else 'NO'}"
             )
+
+
+def cav_gym() -> dict[tuple[str, int], tuple[float, float, float]]:
+    """CAV-Gym by tester and number of pedestrians: interesting % with 95 % Wilson interval."""
+    with (ROOT / "experiments" / "peers.csv").open(encoding="utf-8", newline="") as stream:
+        return {
+            (row["tester"], int(row["testers"])): (
+                float(row["percent"]),
+                float(row["low"]),
+                float(row["high"]),
+            )
+            for row in csv.DictReader(stream)
+            if row["source"] == "re-measured"
+        }
 
 
 def force(runs: int) -> None:

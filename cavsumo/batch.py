@@ -132,7 +132,7 @@ class _Line:
 
     def _grouped(self, runs: Iterable[int]) -> Iterator[_Entry]:
         """Episodes that share a simulation together."""
-        block, agents = self.setting.plan.block, self.setting.plan.agents
+        block, agents = self.setting.plan.block, tuple(self.setting.plan.cast)
         for _, group in groupby(runs, lambda run: run // block):
             wanted = tuple(group)
             yield _Entry(wanted, agents[wanted[0] % len(agents)])

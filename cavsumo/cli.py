@@ -13,8 +13,9 @@ from cavsumo import __version__
 from cavsumo.cli_egos import add_check_ego
 from cavsumo.cli_games import add_game
 from cavsumo.cli_networks import add_import_osm, add_inspect
-from cavsumo.cli_settings import settings_of
-from cavsumo.errors import BatchError, CavsumoError, Exit, InputError
+from cavsumo.cli_results import add_merge, add_replay, add_report
+from cavsumo.cli_settings import parts_of
+from cavsumo.errors import BatchError, CavsumoError, DivergenceError, Exit, InputError
 
 HYPHENATED = ("--bbox", "--ego-route", "--junction")  # options whose values may begin with "-"
 
@@ -26,6 +27,9 @@ def main(argv: Sequence[str] | None = None) -> int:
         options = _parser().parse_args(_joined(words))
         status: int = options.command(options)
         return status
+    except DivergenceError as error:
+        print(f"cavsumo: {error}", file=sys.stderr)
+        return Exit.VIOLATED
     except CavsumoError as error:
         print(f"cavsumo: {error}", file=sys.stderr)
         return Exit.NOT_RUN if isinstance(error, BatchError) else Exit.USAGE
@@ -67,8 +71,9 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("--version", action="version", version=f"cavsumo {__version__}")
     commands = parser.add_subparsers(title="commands", required=True, metavar="COMMAND")
     _add_run(commands)
-    _add_replay(commands)
-    _add_merge(commands)
+    add_replay(commands)
+    add_report(commands)
+    add_merge(commands)
     add_check_ego(commands)
     add_inspect(commands)
     add_import_osm(commands)
@@ -172,9 +177,25 @@ def _add_scenario(group: Any) -> None:
         "each, none; not with --routes FILE",
     )
     add("-a", "--additional-files", metavar="FILES", help="SUMO additional files, with commas")
-    add("-c", "--config", metavar="FILE", help="scenario file (TOML)")
-    add("--ego", metavar="NAME", help="an ego by name (see cavsumo egos) or module:Class")
+    add(
+        "-c",
+        "--config",
+        metavar="FILE",
+        help="scenario file (TOML); with a table [vary] of lists, a batch for each combination",
+    )
+    add(
+        "--ego",
+        metavar="NAME",
+        help="an ego by name, module:Class, exec:COMMAND, tcp:HOST:PORT; see cavsumo egos",
+    )
     add("--ego-param", action="append", metavar="KEY=VALUE", help="a parameter of the ego")
+    add(
+        "--ego-sensor",
+        action="append",
+        metavar="KEY=VALUE",
+        help="what the ego sees of others: range_m, position_noise_m, heading_noise_rad, "
+        "speed_noise_mps, delay_s, occlusion=true (default: everybody, exactly, at once)",
+    )
     add(
         "--ego-route",
         metavar="ROUTE",
@@ -194,13 +215,25 @@ def _add_scenario(group: Any) -> None:
 
 def _add_testers(group: Any) -> None:
     add = group.add_argument
-    add("--agent", dest="agents", action="append", metavar="NAME", help="repeat to compare")
+    add(
+        "--agent",
+        dest="agents",
+        action="append",
+        metavar="NAME",
+        help="repeat to compare; LABEL=NAME for one with parameters of its own",
+    )
     add("--testers", type=int, metavar="N", help="number of tester bodies (default 3)")
     add(
         "--param",
         action="append",
         metavar="KEY=VALUE",
-        help="parameter of the agents that have it; AGENT.KEY=VALUE for one of them",
+        help="parameter of the agents that have it; NAME.KEY=VALUE or LABEL.KEY=VALUE for one",
+    )
+    add(
+        "--tester-sensor",
+        action="append",
+        metavar="KEY=VALUE",
+        help="what the agents see of others, as --ego-sensor",
     )
     add("--kind", help="kind of body: pedestrian (default), car, bus or bicycle")
     add(
@@ -222,51 +255,14 @@ def _add_testers(group: Any) -> None:
     add("--start-speed", type=float, metavar="V", help="speed at the start (default: maximum)")
 
 
-def _add_replay(commands: Any) -> None:
-    replay = commands.add_parser(
-        "replay",
-        help="run one recorded episode again and check, step by step, that it is the same",
-        description="Run one recorded episode again and check, step by step, that it is the same.",
-        allow_abbrev=False,
-    )
-    replay.add_argument("results", type=Path, help="the CSV of a batch")
-    replay.add_argument("run", type=int, help="number of the episode")
-    replay.set_defaults(command=_replay)
-
-
-def _add_merge(commands: Any) -> None:
-    merge = commands.add_parser(
-        "merge",
-        help="put the results of shards together",
-        description="Put the results of shards together: the same file as one run would give.",
-        allow_abbrev=False,
-    )
-    merge.add_argument("parts", nargs="+", type=Path, metavar="PART", help="the CSV of a shard")
-    merge.add_argument("-o", "--output", required=True, type=Path, metavar="FILE")
-    merge.add_argument("--overwrite", action="store_true", help="in place of an unfinished batch")
-    merge.add_argument("-q", "--quiet", action="store_true", help="no summary")
-    merge.set_defaults(command=_merge)
-
-
 def _run(options: argparse.Namespace) -> int:
-    from cavsumo.commands.run import Manner, run
+    from cavsumo.checked import Manner
+    from cavsumo.commands.run import run_study
     from cavsumo.executors import Means
 
     manner = Manner(**{f.name: getattr(options, f.name) for f in dataclasses.fields(Manner)})
     means = Means(options.jobs, options.executor, options.scheduler)
-    return run(settings_of(options), Path(options.output), means, manner)
-
-
-def _replay(options: argparse.Namespace) -> int:
-    from cavsumo.commands.replay import replay
-
-    return replay(options.results, options.run)
-
-
-def _merge(options: argparse.Namespace) -> int:
-    from cavsumo.commands.merge import merge
-
-    return merge(options.parts, options.output, options.overwrite, options.quiet)
+    return run_study(parts_of(options), Path(options.output), means, manner)
 
 
 def _list(options: argparse.Namespace) -> int:

@@ -1,12 +1,15 @@
-"""The words of a command line as the settings of a scenario."""
+"""The words of a command line as the settings of a scenario, or of several."""
 
 from __future__ import annotations
 
 import argparse
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from cavsumo.errors import InputError
+
+if TYPE_CHECKING:
+    from cavsumo.study import Part
 
 # Settings that the command line takes over as they are.
 PLAIN = (
@@ -17,11 +20,16 @@ PLAIN = (
 ).split()
 
 
-def settings_of(options: argparse.Namespace) -> dict[str, Any]:
-    """The settings of a run: the file's, overruled by the command line's."""
-    from cavsumo.scenario import read_config
+def parts_of(options: argparse.Namespace) -> list[Part]:
+    """The batches of a run: the file's, overruled by the command line."""
+    from cavsumo.study import Part, read_study
 
-    settings = read_config(Path(options.config)) if options.config else {}
+    given = settings_of(options)
+    return read_study(Path(options.config), given) if options.config else [Part("", given)]
+
+
+def settings_of(options: argparse.Namespace) -> dict[str, Any]:
+    """The settings that a command line gives."""
     given = {key: getattr(options, key) for key in PLAIN}
     given["deadline_s"], given["budget_s"] = options.deadline, options.budget
     if options.ego_route is not None:
@@ -29,14 +37,16 @@ def settings_of(options: argparse.Namespace) -> dict[str, Any]:
         if not given["ego_route"]:
             raise InputError(f"--ego-route: expected edges, got {options.ego_route!r}")
     given["additional"] = options.additional_files and options.additional_files.split(",")
-    settings |= {key: value for key, value in given.items() if value is not None}
+    settings = {key: value for key, value in given.items() if value is not None}
     for key, words in (
         ("params", options.param),
         ("ego_params", options.ego_param),
         ("assertion_params", options.assert_param),
+        ("ego_sensor", options.ego_sensor),
+        ("tester_sensor", options.tester_sensor),
     ):
         if words:
-            settings[key] = settings.get(key, {}) | dict(assignment(key, w) for w in words)
+            settings[key] = dict(assignment(key, w) for w in words)
     return settings
 
 

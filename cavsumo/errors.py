@@ -10,6 +10,8 @@
     |-- EgoError                the ego's controller raised or gave an answer that is none
     |-- AgentError              a tester agent raised or chose an action outside its space
     |-- SimulationError         SUMO refused a call, or the ego never entered the network
+    |   `-- SimulationTaken     another world took the one simulation of this process
+    |-- DivergenceError         a replay departs from its record (exit status 1)
     |-- BatchError              a batch cannot go on; what ran is kept (exit status 3)
     `-- ResultsError            results on disk are missing, foreign or damaged (exit status 2)
 """
@@ -66,6 +68,24 @@ class AgentError(CavsumoError):
 
 class SimulationError(CavsumoError):
     """SUMO refused a call, or the ego never entered the network."""
+
+
+class SimulationTaken(SimulationError):
+    """Another world of this process began an episode: a process has one simulation."""
+
+
+class DivergenceError(CavsumoError):
+    """A replay departs from its record; the message says where first.
+
+    Attributes:
+        step: the timestep; None when the frames agree and the row does not.
+        body: id of the body, empty when it is no body's quantity.
+        quantity: x, y, v or o of a body, another key of a frame, or a column of the row.
+    """
+
+    def __init__(self, message: str, step: int | None, body: str, quantity: str) -> None:
+        super().__init__(message)
+        self.step, self.body, self.quantity = step, body, quantity
 
 
 class BatchError(CavsumoError):

@@ -6,13 +6,16 @@ Imported by the parent process, so nothing here touches SUMO.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from cavsumo.agents import AGENTS, Agent
+from cavsumo.agents.policy import make_agent, parameters_of, policy_file
 from cavsumo.bodies import Body, kind_named, model_of
-from cavsumo.errors import UnknownName
+from cavsumo.errors import InputError, UnknownName
+from cavsumo.labels import labelled
 from cavsumo.outcomes import Outcome, Row
 from cavsumo.scenario import BatchPlan, Scenario, Simulation
 
@@ -23,7 +26,7 @@ class Job:
 
     Attributes:
         run: its number in the batch.
-        agent: the tester agent's name.
+        agent: the tester agent's label.
         seed: the episode's seed.
         memory: what the agents learned in earlier episodes, one entry an agent; None for none.
         record: keep the frames whatever happens.
@@ -48,19 +51,24 @@ def job(plan: BatchPlan, run: int, memory: tuple[Any, ...] | None = None) -> Job
     """The run-th episode of a batch: agents take turns, so run i stays what it is for any N."""
     episode, which = divmod(run, len(plan.agents))
     seed = episode_seed(plan.seed, episode)
-    return Job(run, plan.agents[which], seed, memory, plan.trace == "all")
+    return Job(run, labelled(plan.agents[which])[0], seed, memory, plan.trace == "all")
 
 
-def make_agents(plan: BatchPlan, name: str) -> list[Agent]:
-    """The agents of one name, one for each team."""
-    known = {name: [p.name for p in AGENTS.parameters(name)]}
-    params = plan.agent_params(name, known)
-    return [AGENTS.make(name, params) for _ in teams(plan.scenario)]
+def make_agents(plan: BatchPlan, label: str) -> list[Agent]:
+    """The agents of one label, one for each team."""
+    name = plan.cast[label]
+    params = plan.agent_params(label, [p.name for p in parameters_of(name)])
+    return [make_agent(name, params) for _ in teams(plan.scenario)]
+
+
+def policy_files(plan: BatchPlan) -> list[Path]:
+    """The files of the agents that are policies."""
+    return [file for name in plan.cast.values() if (file := policy_file(name)) is not None]
 
 
 def learners(plan: BatchPlan) -> frozenset[str]:
-    """The names of the agents that learn from episode to episode."""
-    return frozenset(n for n in plan.agents if any(a.learns for a in make_agents(plan, n)))
+    """The labels of the agents that learn from episode to episode."""
+    return frozenset(n for n in plan.cast if any(a.learns for a in make_agents(plan, n)))
 
 
 def teams(scenario: Scenario) -> tuple[tuple[int, ...], ...]:
@@ -77,9 +85,14 @@ def tester_bodies(scenario: Scenario) -> tuple[Body, ...]:
     return bodies
 
 
+def failed_row(plan: BatchPlan, job: Job, message: str) -> Row:
+    """The row of an episode that could not be played."""
+    return head(plan, job) | {"outcome": "error", "error": message}
+
+
 def failed(plan: BatchPlan, job: Job, message: str, wall: float) -> Outcome:
     """The outcome of an episode that could not be played."""
-    return Outcome(head(plan, job) | {"outcome": "error", "error": message, "wall_s": wall})
+    return Outcome(failed_row(plan, job, message) | {"wall_s": wall})
 
 
 def head(plan: BatchPlan, job: Job) -> Row:
@@ -99,12 +112,19 @@ def head(plan: BatchPlan, job: Job) -> Row:
 
 def check_agents(plan: BatchPlan) -> None:
     """Build every agent once and account for every parameter, before anything starts."""
-    known = {name: [p.name for p in AGENTS.parameters(name)] for name in plan.agents}
+    known = {label: [p.name for p in parameters_of(name)] for label, name in plan.cast.items()}
     shared = {key for keys in known.values() for key in keys}
-    qualified = {f"{name}.{key}" for name, keys in known.items() for key in keys}
+    qualified = {f"{label}.{key}" for label, keys in known.items() for key in keys}
     for key in plan.params:
         valid = qualified if "." in key else shared
         if key not in valid:
             raise UnknownName("parameter", key, valid, f"agent {' '.join(plan.agents)}")
-    for name in plan.agents:
-        make_agents(plan, name)
+    kind = kind_named(plan.scenario.kind)
+    for label, name in plan.cast.items():
+        if label != name and label in AGENTS:
+            raise InputError(f"agent {label}={name}: the label is the name of another agent")
+        for agent in make_agents(plan, label)[:1]:
+            try:
+                agent.check_bodies(kind, plan.scenario.bodies_per_agent)
+            except ValueError as error:
+                raise InputError(f"agent {label}: {error}") from error

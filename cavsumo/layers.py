@@ -13,17 +13,27 @@ from matplotlib.ft2font import FT2Font
 from matplotlib.patches import FancyArrowPatch, PathPatch
 from matplotlib.path import Path as Outline
 from matplotlib.patheffects import withStroke
-from shapely.geometry import LineString, Polygon
+from shapely.geometry import LineString
 
-from cavsumo.facts import PRIORITY, SIGNALS, right_of_way
+from cavsumo.facts import PRIORITY, SIGNALS
 from cavsumo.inspection import Ground, Way
-from cavsumo.network import is_pavement, lane_areas, lane_shape, street
+from cavsumo.network import street
 from cavsumo.paths import Path as Polyline
+from cavsumo.surfaces import (
+    beside,
+    crossings,
+    junctions,
+    lane_kind,
+    lanes_by_kind,
+    markings,
+    stripes,
+    walking_areas,
+)
 
 Box = tuple[float, float, float, float]  # west, south, east, north [m]
 
-STRIPE_M = 0.5  # width of a zebra's stripe, and of the gap behind it
 GROUND, ROAD, OTHER, PAVEMENT, WALKING = "#eef1ea", "#8b9096", "#b49a7c", "#d9d4c7", "#c9c2b0"
+LANES = {"road": ROAD, "other": OTHER, "pavement": PAVEMENT}
 TURNS = {"straight": "#1b7837", "left": "#2166ac", "right": "#d6604d", "u-turn": "#762a83"}
 AREA, AREA_EDGE = "#f5b301", "#a87400"
 CROSSING_LINES: dict[str, Any] = {"color": "white", "lw": 1.6, "ls": (0, (1.2, 0.8))}
@@ -43,38 +53,20 @@ BESIDE_M = {"straight": 0.0, "left": 0.5, "right": -0.5, "u-turn": 1.0}  # route
 def draw_surfaces(axes: Axes, here: Ground, view: Box) -> None:
     """Junctions, lanes by kind, the lines between them, walking areas, street names."""
     network, window = here.network, shapely.box(*view)
-    nodes = [node.getShape() for node in network.net.getNodes()]
-    _fill(axes, [Polygon(shape) for shape in nodes if len(shape) > 2], window, ROAD, 1)
-    lanes = [lane for edge in network.edges for lane in edge.getLanes()]
-    surfaces = lane_areas(lanes)
-    for color in (ROAD, OTHER, PAVEMENT):
-        of_it = [s for lane, s in zip(lanes, surfaces, strict=True) if lane_color(lane) == color]
-        _fill(axes, of_it, window, color, 2)
-    shapes = [edge.getLanes()[0].getShape() for edge in network.inside("walkingarea")]
-    _fill(axes, [Polygon(shape) for shape in shapes if len(shape) > 2], window, WALKING, 3)
-    for edge in network.edges:
-        _draw_markings(axes, edge, network.left_hand, window)
+    _fill(axes, junctions(network), window, ROAD, 1)
+    for kind, surfaces in lanes_by_kind(network).items():
+        _fill(axes, surfaces, window, LANES[kind], 2)
+    _fill(axes, walking_areas(network), window, WALKING, 3)
+    for border, solid in markings(network):
+        if border.intersects(window):
+            style = "-" if solid else (0, (6, 6))
+            axes.plot(*border.xy, color="white", lw=0.7, ls=style, zorder=2.5)
     _draw_names(axes, here, window)
 
 
 def lane_color(lane: Any) -> str:
     """The colour of a lane by its kind."""
-    if is_pavement(lane):
-        return PAVEMENT
-    return ROAD if lane.allows("passenger") else OTHER
-
-
-def _draw_markings(axes: Axes, edge: Any, left_hand: bool, window: shapely.Geometry) -> None:
-    """Dashes between the lanes of an edge, a line on the side of oncoming traffic."""
-    lanes = [lane for lane in edge.getLanes() if not is_pavement(lane)]
-    side = -1.0 if left_hand else 1.0  # of a lane on which the next one lies
-    for lane in lanes:
-        axis = LineString(lane_shape(lane))
-        if axis.intersects(window):
-            border = axis.offset_curve(side * lane.getWidth() / 2)
-            style = "-" if lane is lanes[-1] else (0, (6, 6))
-            if not border.is_empty and border.geom_type == "LineString":
-                axes.plot(*border.xy, color="white", lw=0.7, ls=style, zorder=2.5)
+    return LANES[lane_kind(lane)]
 
 
 def _draw_names(axes: Axes, here: Ground, window: shapely.Geometry) -> None:
@@ -101,36 +93,18 @@ def _draw_names(axes: Axes, here: Ground, window: shapely.Geometry) -> None:
 def draw_crossings(axes: Axes, here: Ground, view: Box) -> None:
     """Zebra stripes where pedestrians have priority, two lines elsewhere, dots at signals."""
     window = shapely.box(*view)
-    for crossing in here.network.crossings():
-        lane = crossing.getLanes()[0]
-        axis, half = LineString(lane_shape(lane)), float(lane.getWidth()) / 2
+    for axis, half, right in crossings(here.network):
         if not axis.intersects(window):
             continue
-        right = right_of_way(crossing)
         if right == PRIORITY:
-            _fill(axes, _stripes(axis, half), window, "white", 4)
+            _fill(axes, stripes(axis, half), window, "white", 4)
             continue
-        for side in (-half, half):
-            border = axis.offset_curve(side)
-            if border.geom_type == "LineString" and not border.is_empty:
-                axes.plot(*border.xy, **CROSSING_LINES, zorder=4)
+        for border in filter(None, (beside(axis, -half), beside(axis, half))):
+            axes.plot(*border.xy, **CROSSING_LINES, zorder=4)
         if right == SIGNALS:
             axes.plot(
                 *zip(axis.coords[0], axis.coords[-1], strict=True), ls="", **SIGNAL_DOTS, zorder=6
             )
-
-
-def _stripes(axis: LineString, half: float) -> list[shapely.Geometry]:
-    """The stripes of a zebra crossing, along the road that it crosses."""
-    line = Polyline(axis.coords)
-    starts = [i * 2 * STRIPE_M for i in range(int(line.length / (2 * STRIPE_M)) + 1)]
-    return [
-        LineString(line.cut(s, min(line.length, s + STRIPE_M)).points).buffer(
-            half, cap_style="flat"
-        )
-        for s in starts
-        if line.length - s > 0.05
-    ]
 
 
 def _fill(
@@ -174,12 +148,10 @@ def draw_routes(axes: Axes, ways: Sequence[Way]) -> None:
     """The ego's routes, side by side, the best one widest and on top, arrows at their ends."""
     for rank, way in reversed(list(enumerate(ways))):
         line = LineString(way.route.path.points)
-        beside = line.offset_curve(BESIDE_M[way.turn])
-        if beside.geom_type != "LineString" or beside.is_empty:
-            beside = line
-        path = Polyline(beside.coords)
+        shown = beside(line, BESIDE_M[way.turn]) or line
+        path = Polyline(shown.coords)
         color, wide, z = TURNS[way.turn], *((3.4, 8.0) if rank == 0 else (1.5, 7.0))
-        axes.plot(*beside.xy, color=color, lw=wide, zorder=z, solid_joinstyle="round")
+        axes.plot(*shown.xy, color=color, lw=wide, zorder=z, solid_joinstyle="round")
         axes.plot(*path.points[0], "o", color=color, ms=2 + 1.5 * wide, zorder=z)
         tail, tip = path.at(path.length - 0.5)[:2], path.at(path.length + 3.0)[:2]
         arrow = FancyArrowPatch(tail, tip, arrowstyle="-|>", mutation_scale=8 + 3 * wide)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from inspect import Parameter
 from typing import Any
 
 from cavsumo.registry import Registry
@@ -19,10 +21,59 @@ def registries() -> dict[str, Registry[Any]]:
 def listing(sort: str, name: str | None) -> str:
     """One line for each entry, or one entry with its parameters, defaults and units."""
     registry = registries()[sort]
+    if sort == "agents" and name is not None and name.startswith("policy:"):
+        return _policy(name)
     if name is None:
-        width = max(map(len, registry))
-        return "\n".join(f"{n:{width}}  {registry.summary(n)}" for n in registry)
-    lines = [f"{name}: {registry.summary(name)}"]
-    shown = [(p, f"{p.name}={p.default}") for p in registry.parameters(name)]
-    width = max((len(text) for _, text in shown), default=0)
-    return "\n".join(lines + [f"  {text:{width}}  {p.doc}" for p, text in shown])
+        lines = {n: registry.summary(n) for n in registry}
+        return "\n".join(_columns({**lines, **_forms(sort)}))
+    if sort == "egos":
+        registry = _registry_of(name, registry)
+    name = name.partition(":")[0]
+    shown = {
+        f"{p.name}={p.default}": p.doc
+        for p in registry.parameters(name)
+        if p.default is not Parameter.empty  # what stands behind the colon
+    }
+    return "\n".join(
+        [f"{name}: {registry.summary(name)}", *(f"  {line}" for line in _columns(shown))]
+    )
+
+
+def _columns(lines: Mapping[str, str]) -> list[str]:
+    """Two columns, the first as wide as need be."""
+    width = max(map(len, lines), default=0)
+    return [f"{first:{width}}  {second}" for first, second in lines.items()]
+
+
+def _forms(sort: str) -> Mapping[str, str]:
+    """How one from the user is named."""
+    from cavsumo.egos.specs import FORMS
+
+    policies = {"policy:FILE": "a tester that you trained, in a policy file (.npz)"}
+    return {"egos": FORMS, "agents": policies}.get(sort, {})
+
+
+def _registry_of(ego: str, registered: Registry[Any]) -> Registry[Any]:
+    """Where the parameters of an ego are found: exec and tcp have a registry of their own."""
+    from cavsumo.egos.external import EXTERNAL
+
+    return EXTERNAL if ego.partition(":")[0] in EXTERNAL else registered
+
+
+def _policy(spec: str) -> str:
+    """What a policy file says of itself."""
+    from cavsumo.agents.policy import policy_file
+    from cavsumo.policies import read_policy
+
+    file = policy_file(spec)
+    assert file is not None
+    policy = read_policy(file)
+    header = policy.header
+    sizes = [len(policy.mean), *(len(biases) for _, biases in policy.layers)]
+    facts: dict[str, str] = {
+        "bodies": f"{header.bodies} {header.kind} a team",
+        "actions": f"{header.actions}, each for {header.hold} timesteps",
+        "network": f"{' > '.join(map(str, sizes))}, {header.activation}",
+    } | {key: str(value) for key, value in header.metadata.items()}
+    title = f"{spec}: a trained policy; what it is shown: cavsumo/observations.py"
+    return "\n".join([title, *(f"  {line}" for line in _columns(facts))])

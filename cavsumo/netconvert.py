@@ -64,6 +64,12 @@ def sumo_home() -> Path:
     return home
 
 
+def sumo_environment(home: Path) -> dict[str, str]:
+    """The environment in which a program of eclipse-sumo finds its data."""
+    proj = str(home / "data" / "proj")
+    return {**os.environ, "SUMO_HOME": str(home), "PROJ_LIB": proj, "PROJ_DATA": proj}
+
+
 def netconvert_version() -> str:
     """The version of the package that brings netconvert."""
     return version("eclipse-sumo")
@@ -82,12 +88,14 @@ def netconvert(
     Raises InputError in one sentence when it refuses, crashes or takes too long.
     """
     home = sumo_home()
-    proj = str(home / "data" / "proj")
-    environment = {**os.environ, "SUMO_HOME": str(home), "PROJ_LIB": proj, "PROJ_DATA": proj}
     command = [str(home / "bin" / "netconvert"), *(f"--{option}" for option in options)]
     try:
         done = subprocess.run(
-            command, cwd=folder, env=environment, capture_output=True, timeout=time_limit_s
+            command,
+            cwd=folder,
+            env=sumo_environment(home),
+            capture_output=True,
+            timeout=time_limit_s,
         )
     except subprocess.TimeoutExpired:
         raise InputError(

@@ -1,4 +1,4 @@
-"""What an episode leaves: its row in the CSV and the trace beside it, as text.
+"""What an episode leaves: its row in the CSV, and the trace beside it as text.
 
 Both are made where the episode was played, so that the process that collects them only writes.
 """
@@ -9,12 +9,11 @@ import csv
 import io
 import json
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
 from cavsumo.assertions.base import HELD, VIOLATED
-from cavsumo.snapshot import BodyState, Snapshot
 
 # The columns of results.csv with their meaning, in order; interface of everything downstream.
 COLUMNS: Mapping[str, str] = {
@@ -63,10 +62,12 @@ class Outcome:
     Attributes:
         row: its row, by column.
         trace: the frames worth keeping as JSON lines, empty for none.
+        ego_log: what an ego from outside printed, which may differ from run to run; mostly empty.
     """
 
     row: Row
     trace: str = ""
+    ego_log: str = ""
 
     @property
     def frames(self) -> list[dict[str, Any]]:
@@ -92,29 +93,6 @@ def row_line(row: Mapping[str, Any]) -> str:
     cells = [cell(row.get(column)) for column in COLUMNS]
     csv.writer(line, lineterminator="\n").writerow(cells)
     return line.getvalue()
-
-
-def trace_text(row: Row, frames: Iterable[Mapping[str, Any]]) -> str:
-    """A trace as JSON lines: the row's identity, then one frame a timestep."""
-    head = {key: row[key] for key in ("run", "agent", "ego", "seed", "outcome", "tester")}
-    return "".join(json.dumps(line, allow_nan=False) + "\n" for line in (head, *frames))
-
-
-def frame(snapshot: Snapshot) -> dict[str, Any]:
-    """A snapshot as one line of a trace: every body as [x, y, v, o], in full precision."""
-    return {
-        "step": snapshot.step,
-        "time_s": snapshot.time,
-        "ego": _pose(snapshot.ego),
-        "steering": snapshot.ego_steering,
-        "testers": {t.id: _pose(t) for t in snapshot.testers},
-        "background": {b.id: _pose(b) for b in snapshot.background},
-        "lights": "".join(snapshot.lights),
-    }
-
-
-def _pose(state: BodyState) -> list[float]:
-    return [state.x, state.y, state.v, state.o]
 
 
 def is_test(row: Mapping[str, Any]) -> bool:

@@ -5,7 +5,6 @@ Needs matplotlib; draws into a file, never on a screen.
 
 from __future__ import annotations
 
-import gzip
 import math
 from collections.abc import Sequence
 from pathlib import Path
@@ -40,9 +39,9 @@ from cavsumo.layers import (
     lane_color,
 )
 from cavsumo.network import lane_shape
+from cavsumo.surfaces import credit
 
 MARGIN_M = 12.0  # around the routes
-OSM = "Map data © OpenStreetMap contributors, ODbL"
 HEIGHT_IN, DPI = 9.0, 150
 CROSSING_LABELS = {
     SIGNALS: "crossings at traffic lights",
@@ -65,8 +64,9 @@ def draw(here: Ground, junction: Junction | None, file: Path) -> None:
     draw_areas(axes, ways)
     draw_routes(axes, ways)
     _draw_scale(axes, view)
-    if _is_osm(here.network.file):
-        axes.text(0.995, 0.01, OSM, transform=axes.transAxes, ha="right", fontsize=7, zorder=11)
+    source = credit(here.network.file)
+    if source:
+        axes.text(0.995, 0.01, source, transform=axes.transAxes, ha="right", fontsize=7, zorder=11)
     streets, name = _titles(here, junction)
     axes.set_title(f"{streets}\n" if streets else "", loc="left", fontsize=13)
     axes.text(0, 1.012, name, transform=axes.transAxes, fontsize=8, color="#444444")
@@ -79,13 +79,6 @@ def draw(here: Ground, junction: Junction | None, file: Path) -> None:
         figure.savefig(file, bbox_inches="tight", pad_inches=0.15, metadata=metadata)
     except OSError as error:
         raise InputError(f"--picture {str(file)!r}: {error.strerror}") from error
-
-
-def _is_osm(file: Path) -> bool:
-    """Whether a network was made of OpenStreetMap's data: its licence asks to say so."""
-    opener = gzip.open if file.suffix == ".gz" else open
-    with opener(file, "rb") as stream:
-        return b"OpenStreetMap" in stream.read(4096)
 
 
 def _view(here: Ground, ways: Sequence[Way]) -> Box:

@@ -1,8 +1,8 @@
 """Results on disk, written so that whatever happens, what stands there is whole.
 
-The results file is locked while a batch writes it. Every row is one write, its trace is there
-before it, and the manifest is replaced as a whole. A process that is killed leaves at most one
-torn row at the end, which ``resume`` takes off again; a full disk leaves none.
+The results file is locked while a batch writes it. Every row is one write, its trace (and what the
+ego printed) is there before it, and the manifest is replaced as a whole. A process that is killed
+leaves at most one torn row at the end, which ``resume`` takes off again; a full disk leaves none.
 """
 
 from __future__ import annotations
@@ -14,12 +14,21 @@ import os
 from collections.abc import Iterator, Mapping
 from contextlib import suppress
 from io import FileIO
+from itertools import chain
 from pathlib import Path
 from typing import Any
 
 from cavsumo.errors import BatchError, ResultsError
 from cavsumo.outcomes import COLUMNS, Outcome, Row, row_line
-from cavsumo.results import FORMAT, HEADER, STARTING, check_replaceable, trace_name, whole_lines
+from cavsumo.results import (
+    FORMAT,
+    HEADER,
+    STARTING,
+    check_replaceable,
+    ego_log_name,
+    trace_name,
+    whole_lines,
+)
 
 RUNNING = "running"
 UNENCODABLE = "backslashreplace"  # file names may hold what is no Unicode
@@ -94,6 +103,7 @@ class Recorder:
             ) from error
 
     _size, _last = 0, -1  # bytes of whole rows; the last episode among them
+    _has_folder = False  # whether there may be files beside the rows
 
     def write(self, outcome: Outcome) -> Row:
         """Append a row, its trace first; raises BatchError when the disk takes no more."""
@@ -149,24 +159,29 @@ class Recorder:
             raise self._no_more(error) from error
 
     def _with_trace(self, outcome: Outcome) -> Row:
-        """The row, naming its trace if there is one; the trace is written."""
-        row = dict(outcome.row)
-        name = trace_name(self.csv_file, row["run"])
+        """The row, naming its trace if there is one; that and the ego's log are written."""
+        row, name = dict(outcome.row), trace_name(self.csv_file, outcome.row["run"])
+        self.traces -= self._put(name, outcome.trace)
+        self.traces += bool(outcome.trace)
+        self._put(ego_log_name(self.csv_file, row["run"]), outcome.ego_log)
+        return row | {"trace": name} if outcome.trace else row
+
+    def _put(self, name: str, text: str) -> bool:
+        """Write a file beside the rows, none if there is no text; whether one was there before."""
         file = self.csv_file.parent / name
-        if self.traces and file.exists():  # a batch that has none has no folder to look into
+        there = self._has_folder and file.exists()
+        if there:
             file.unlink()
-            self.traces -= 1
-        if not outcome.trace:
-            return row
-        try:
-            self.trace_folder.mkdir(exist_ok=True)
-            file.write_text(outcome.trace, encoding="utf-8")
-        except OSError as error:
-            with suppress(OSError):
-                file.unlink()
-            raise self._no_more(error) from error
-        self.traces += 1
-        return row | {"trace": name}
+        if text:
+            try:
+                self.trace_folder.mkdir(exist_ok=True)
+                file.write_text(text, encoding="utf-8")
+            except OSError as error:
+                with suppress(OSError):
+                    file.unlink()
+                raise self._no_more(error) from error
+            self._has_folder = True
+        return there
 
     def _whole_rows(self, todo: Iterator[int]) -> Iterator[dict[str, str]]:
         """The rows that are there, which must be those that the batch begins with."""
@@ -185,16 +200,17 @@ class Recorder:
 
     def _start_rows(self) -> None:
         """Be ready for the next row, the header before the first."""
+        self._has_folder = self.trace_folder.is_dir()
         if not self._size:
             _write_all(self._file, HEADER.encode("utf-8"))
             self._size = len(HEADER.encode("utf-8"))
         self._write_manifest(RUNNING)
 
     def _remove_traces(self, after: int) -> None:
-        """Remove the traces of later episodes, and nothing else."""
+        """Remove the traces and logs of later episodes, and nothing else."""
         if self.trace_folder.is_dir():
-            for old in self.trace_folder.glob("run*.jsonl"):
-                number = old.stem.removeprefix("run")
+            for old in chain(*map(self.trace_folder.glob, ("run*.jsonl", "run*.ego.log"))):
+                number = old.name.removeprefix("run").partition(".")[0]
                 if number.isdecimal() and len(number) >= 6 and int(number) > after:
                     old.unlink()
 

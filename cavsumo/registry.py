@@ -43,6 +43,9 @@ class Registry(Generic[T]):
 
         return file
 
+    def __contains__(self, name: str) -> bool:
+        return name in self._entries
+
     def __iter__(self) -> Iterator[str]:
         return iter(sorted(self._entries))
 

@@ -1,4 +1,4 @@
-"""Results on disk, read: manifest, rows and traces, with one sentence when they are damaged."""
+"""Results on disk, read: manifest and rows, with one sentence when they are damaged."""
 
 from __future__ import annotations
 
@@ -17,13 +17,17 @@ if TYPE_CHECKING:
 FORMAT = "cavsumo-results-1"
 STARTING = "starting"  # a manifest that says so owns none of the rows that lie beside it
 COMPLETE = ("finished", "stopped", STARTING)  # the statuses of which no row would be missed
-FRAME_KEYS = {"step", "time_s", "ego", "steering", "testers", "background"}
 HEADER = ",".join(COLUMNS) + "\n"
 
 
 def trace_name(csv_file: Path, run: int) -> str:
     """Where the trace of an episode lies, relative to the results file."""
     return f"{csv_file.stem}/run{run:06d}.jsonl"
+
+
+def ego_log_name(csv_file: Path, run: int) -> str:
+    """Where lies what the ego printed in an episode, relative to the results file."""
+    return f"{csv_file.stem}/run{run:06d}.ego.log"
 
 
 def read_manifest(csv_file: Path) -> dict[str, Any]:
@@ -109,19 +113,6 @@ def _parsed(line: bytes, place: str) -> dict[str, str]:
     if not row["run"].isdecimal():
         raise ResultsError(f"{place} begins with {row['run']!r}, expected the number of a run")
     return row
-
-
-def read_trace(file: Path) -> list[dict[str, Any]]:
-    """The frames of a trace."""
-    try:
-        lines = file.read_text(encoding="utf-8").splitlines()
-        frames = [json.loads(line) for line in lines[1:]]
-        for found in frames:
-            if not set(found) >= FRAME_KEYS:
-                raise ValueError(f"a frame without {', '.join(sorted(FRAME_KEYS - set(found)))}")
-        return frames
-    except (OSError, ValueError, TypeError) as error:
-        raise ResultsError(f"trace {str(file)!r}: cannot be read: {error}") from error
 
 
 def read_results(csv_file: Path) -> pandas.DataFrame:

@@ -7,8 +7,7 @@ are refused with the nearest valid one.
 from __future__ import annotations
 
 import math
-import tomllib
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -23,6 +22,8 @@ from pydantic import (
 
 from cavsumo.checks import densities
 from cavsumo.errors import InputError, UnknownName
+from cavsumo.labels import cast_of
+from cavsumo.sensors import Sensor
 
 SHARED_BY = 25  # episodes that share one simulation when asked to
 Finite = Annotated[float, Field(allow_inf_nan=False)]
@@ -45,7 +46,9 @@ class Scenario(BaseModel):
         "and kilometre of road, each direction counted, and of pavement; instead of routes",
     )
     additional: tuple[Path, ...] = Field((), description="SUMO additional files")
-    ego: str = Field("sumo", description="registered ego or module:Class")
+    ego: str = Field(
+        "sumo", description="registered ego, module:Class, exec:COMMAND or tcp:HOST:PORT"
+    )
     ego_params: Params = Field(default_factory=dict, description="parameters of the ego")
     ego_route: tuple[str, ...] = Field(
         (), description="edges of the ego's route, or one word: straight, left, right or u-turn"
@@ -74,6 +77,10 @@ class Scenario(BaseModel):
     sumo_width: Finite = Field(
         0.05, ge=0.01, le=5, description="width that SUMO is shown of a tester pedestrian [m]"
     )
+    ego_sensor: Sensor | None = Field(
+        None, description="how the ego sees the others; exactly and at once if not given"
+    )
+    tester_sensor: Sensor | None = Field(None, description="how the tester agents do")
     end: Finite = Field(60.0, gt=0, le=36000, description="horizon of an episode [s]")
     step_length: Finite = Field(0.1, ge=0.001, le=1, description="timestep lambda [s]")
     assertions: tuple[str, ...] = Field(
@@ -95,6 +102,12 @@ class Scenario(BaseModel):
         """One number for cars and pedestrians or two, as numbers or as text with a comma."""
         return None if value is None else densities(value)
 
+    @field_validator("ego_sensor", "tester_sensor")
+    @classmethod
+    def _full_observability(cls, value: Sensor | None) -> Sensor | None:
+        """A sensor that changes nothing is none."""
+        return None if value == Sensor() else value
+
     @field_validator("ego_route", mode="before")
     @classmethod
     def _words(cls, value: Any) -> Any:
@@ -113,7 +126,9 @@ class BatchPlan(BaseModel):
     model_config = ConfigDict(extra="forbid", frozen=True)
 
     scenario: Scenario
-    agents: tuple[str, ...] = Field(("timing",), min_length=1)
+    agents: tuple[str, ...] = Field(
+        ("timing",), min_length=1, description="names of agents, or LABEL=NAME"
+    )
     params: Params = Field(default_factory=dict)
     runs: int = Field(100, ge=1, le=10_000_000)
     seed: int = Field(1, ge=0, le=2**63 - 1)
@@ -148,6 +163,17 @@ class BatchPlan(BaseModel):
             part_of(value) if info.field_name == "shard" else half_width(value)
         return value
 
+    @field_validator("agents")
+    @classmethod
+    def _told_apart(cls, value: tuple[str, ...]) -> tuple[str, ...]:
+        cast_of(value)
+        return value
+
+    @property
+    def cast(self) -> dict[str, str]:
+        """The names of the agents by their labels, in the order in which they take turns."""
+        return cast_of(self.agents)
+
     @property
     def block(self) -> int:
         """How many episodes in a row share one simulation, and are played by one process."""
@@ -169,10 +195,10 @@ class BatchPlan(BaseModel):
         """How many episodes that are."""
         return self.runs * len(self.agents) if self.shard is None else sum(1 for _ in self.todo())
 
-    def agent_params(self, agent: str, known: Mapping[str, list[str]]) -> Params:
-        """The parameters meant for one agent: its own (``agent.key``) and those it knows."""
-        prefix = f"{agent}."
-        mine = {k: v for k, v in self.params.items() if "." not in k and k in known[agent]}
+    def agent_params(self, label: str, known: Sequence[str]) -> Params:
+        """The parameters meant for one agent: its own (``label.key``) and those it knows."""
+        prefix = f"{label}."
+        mine = {k: v for k, v in self.params.items() if "." not in k and k in known}
         return mine | {
             k.removeprefix(prefix): v for k, v in self.params.items() if k.startswith(prefix)
         }
@@ -200,19 +226,7 @@ def part_of(text: str) -> tuple[int, int]:
 
 SCENARIO_KEYS = frozenset(Scenario.model_fields)
 PLAN_KEYS = frozenset(BatchPlan.model_fields) - {"scenario"}
-PATH_KEYS = ("net", "routes", "additional")
-
-
-def read_config(file: Path) -> dict[str, Any]:
-    """The keys of a scenario file (TOML), paths resolved against its folder."""
-    try:
-        data = tomllib.loads(file.read_text(encoding="utf-8"))
-    except OSError as error:
-        raise InputError(f"config {str(file)!r}: {error.strerror}") from error
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        raise InputError(f"config {str(file)!r}: {error}") from error
-    _check_keys(data, str(file))
-    return {k: _resolved(k, v, file.parent) for k, v in data.items()}
+SENSOR_KEYS = ("ego_sensor", "tester_sensor")
 
 
 def plan_from(settings: Mapping[str, Any], source: str) -> BatchPlan:
@@ -222,7 +236,7 @@ def plan_from(settings: Mapping[str, Any], source: str) -> BatchPlan:
     found when none is named and no traffic is to be drawn; ``routes = "none"`` keeps the roads
     empty.
     """
-    _check_keys(settings, source)
+    check_keys(settings, source)
     if "net" not in settings:
         raise InputError(f"{source}: no network given; name one with --net FILE")
     scenario = {k: v for k, v in settings.items() if k in SCENARIO_KEYS}
@@ -252,11 +266,16 @@ def plan_from(settings: Mapping[str, Any], source: str) -> BatchPlan:
     return plan
 
 
-def _check_keys(settings: Mapping[str, Any], source: str) -> None:
+def check_keys(settings: Mapping[str, Any], source: str) -> None:
     """Refuse keys that no setting has."""
     for key in settings:
         if key not in SCENARIO_KEYS | PLAN_KEYS:
             raise UnknownName("key", key, SCENARIO_KEYS | PLAN_KEYS, source)
+    for sensor in SENSOR_KEYS:
+        given = settings.get(sensor)
+        for key in given if isinstance(given, Mapping) else ():
+            if key not in Sensor.model_fields:
+                raise UnknownName(f"key of {sensor}", key, Sensor.model_fields, source)
 
 
 def _route_file(scenario: Mapping[str, Any], source: str) -> Path | None:
@@ -279,15 +298,6 @@ def _route_file(scenario: Mapping[str, Any], source: str) -> Path | None:
         if file.is_file():
             return file
     return None
-
-
-def _resolved(key: str, value: Any, folder: Path) -> Any:
-    """A path of a scenario file, relative to that file, as SUMO has it in its own."""
-    if key not in PATH_KEYS or value == "none":
-        return value
-    if isinstance(value, list):
-        return [str(folder / str(v)) for v in value]
-    return str(folder / str(value))
 
 
 def _first_problem(error: ValidationError) -> str:

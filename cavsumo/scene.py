@@ -35,6 +35,7 @@ class Scene:
     lights: tuple[Light, ...] = ()
     seed: int = 0
     _progress: list[Any] = field(default_factory=lambda: [None, None], repr=False)
+    _glimpse: list[Any] = field(default_factory=lambda: [None, None], repr=False)
     _ways: dict[int, Crossing | None] = field(default_factory=dict, repr=False)
 
     def way(self, index: int) -> Crossing | None:
@@ -50,12 +51,23 @@ class Scene:
 
     def ego_projection(self, snapshot: Snapshot) -> Projection:
         """Where the ego's centre is relative to its path; computed once for each snapshot."""
+        if snapshot.unseen is not None:
+            return self._glimpsed(snapshot)
         last, here = self._progress
         if last is not snapshot:
-            # The last segment is a hint only as long as the ego is not out of sight in between.
-            followed = here is not None and snapshot.step - last.step == 1
-            near = here.segment if followed else None
-            here = self.ego_path.project(snapshot.ego.x, snapshot.ego.y, near)
+            if last is None or last.ego is not snapshot.ego:
+                # The last segment is a hint only as long as the ego is not out of sight in between.
+                followed = here is not None and snapshot.step - last.step == 1
+                near = here.segment if followed else None
+                here = self.ego_path.project(snapshot.ego.x, snapshot.ego.y, near)
             self._progress[:] = snapshot, here
         found: Projection = here
+        return found
+
+    def _glimpsed(self, snapshot: Snapshot) -> Projection:
+        """As a tester's sensor shows it: the ego may be anywhere next, so it is not followed."""
+        if self._glimpse[0] is not snapshot:
+            ego = snapshot.ego
+            self._glimpse[:] = snapshot, self.ego_path.project(ego.x, ego.y)
+        found: Projection = self._glimpse[1]
         return found

@@ -21,8 +21,9 @@ from cavsumo.bodies import WALKING, Kind, kind_named
 from cavsumo.demand import BEYOND_S
 from cavsumo.egos import make_ego
 from cavsumo.egos.base import Ego
+from cavsumo.egos.specs import ego_files
 from cavsumo.errors import InputError
-from cavsumo.jobs import check_agents, learners, make_agents
+from cavsumo.jobs import check_agents, learners, make_agents, policy_files
 from cavsumo.options import OPTIONS
 from cavsumo.scenario import BatchPlan
 from cavsumo.signals import Pace
@@ -65,8 +66,11 @@ class Setting:
             raise InputError(f"{name} is {here} in the process that simulates, expected {there}")
 
 
-def prepare(plan: BatchPlan) -> Setting:
-    """Check every name and parameter of a plan and derive its site; raises InputError."""
+def prepare(plan: BatchPlan, ego: Ego | None = None) -> Setting:
+    """Check every name and parameter of a plan and derive its site; raises InputError.
+
+    ``ego`` drives instead of the one that the plan names.
+    """
     scenario = plan.scenario
     check_agents(plan)
     for name in scenario.assertions:
@@ -79,7 +83,12 @@ def prepare(plan: BatchPlan) -> Setting:
             f"{what}: {' and '.join(sorted(learners(plan)))} learns from episode to episode, in "
             "sequence; learn=false plays what was learned"
         )
-    ego = make_ego(scenario.ego, scenario.ego_params)
+    ego = ego or make_ego(scenario.ego, scenario.ego_params)
+    if scenario.ego_sensor and type(ego).act is Ego.act:
+        raise InputError(
+            f"ego_sensor: ego {scenario.ego} is driven by SUMO, which sees everybody; a sensor "
+            "needs a controller, such as time-gap"
+        )
     site = derive_site(
         scenario.net, scenario.ego_route, scenario.junction, ego.kind, wishes(plan, kind, ego)
     )
@@ -123,26 +132,36 @@ def _check_kind(plan: BatchPlan, kind: Kind) -> None:
         if plan.scenario.approaches:
             raise InputError(f"kind {kind.name!r}: only vehicles have approaches; name a --kind")
         return
-    for name in plan.agents:
-        if not all(agent.drives for agent in make_agents(plan, name)):
+    for label in plan.cast:
+        if not all(agent.drives for agent in make_agents(plan, label)):
             raise InputError(
-                f"kind {kind.name!r}: agent {name} can only walk; choose another agent or kind "
+                f"kind {kind.name!r}: agent {label} can only walk; choose another agent or kind "
                 f"{' or '.join(WALKING)}"
             )
 
 
 def _types(plan: BatchPlan) -> tuple[str, ...]:
     """The types of approach on which all agents can do the one manoeuvre asked of them."""
-    agents = [agent for name in plan.agents for agent in make_agents(plan, name)]
+    agents = [agent for label in plan.cast for agent in make_agents(plan, label)]
     names = {getattr(agent, "manoeuvre", "auto") for agent in agents}
     return types_for(names.pop()) if len(names) == 1 else ()
 
 
 def checksums(plan: BatchPlan) -> dict[str, str]:
-    """The SHA-256 of every file that a plan names."""
+    """The SHA-256 of every file that a plan names, its ego's among them."""
     scenario = plan.scenario
     files = [scenario.net, *([scenario.routes] if scenario.routes else []), *scenario.additional]
-    return {str(file): hashlib.sha256(file.read_bytes()).hexdigest() for file in files}
+    files += policy_files(plan)
+    return {str(file): checksum(file) for file in (*files, *ego_files(scenario.ego))}
+
+
+def checksum(file: Path) -> str:
+    """The SHA-256 of a file, which may be large."""
+    try:
+        with file.open("rb") as stream:
+            return hashlib.file_digest(stream, "sha256").hexdigest()
+    except OSError as error:
+        raise InputError(f"{str(file)!r}: cannot be read: {error.strerror}") from error
 
 
 def versions() -> dict[str, str]:
@@ -160,13 +179,13 @@ def manifest(setting: Setting) -> dict[str, Any]:
         "plan": setting.plan.model_dump(mode="json"),
         "ego_route": list(setting.site.route.edges),
         "junction": setting.site.route.junction,
-        "sha256": dict(setting.checksums) | _traffic_checksum(setting.site),
+        "sha256": dict(setting.checksums) | traffic_checksum(setting.site),
         "versions": dict(setting.versions),
         "sumo_options": dict(OPTIONS),
     }
 
 
-def _traffic_checksum(site: Site) -> dict[str, str]:
+def traffic_checksum(site: Site) -> dict[str, str]:
     """The SHA-256 of the background traffic that was drawn, if any."""
     if site.demand is None:
         return {}

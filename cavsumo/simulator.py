@@ -22,6 +22,7 @@ from cavsumo.rewards import Feedback, Ledger
 from cavsumo.roads import Start
 from cavsumo.scenario import Simulation
 from cavsumo.scene import Scene
+from cavsumo.sensors import Senses
 from cavsumo.snapshot import BodyState, Snapshot
 from cavsumo.stage import Stage
 
@@ -57,7 +58,8 @@ class Performance:
 
     Attributes:
         scene: what does not change during the episode.
-        snapshot: what is seen now.
+        snapshot: the truth now.
+        ego_view, agent_views: what the ego and each agent see of it.
         over: whether it has ended.
     """
 
@@ -71,7 +73,8 @@ class Performance:
         simulation: Simulation = "own",
     ) -> None:
         self._stage, self._agents, self._record = stage, agents, record
-        self.scene, self.snapshot = _reset(stage, agents, seed, record, simulation)
+        self.scene, self.snapshot, self._senses = _reset(stage, agents, seed, record, simulation)
+        self._show(self.snapshot)
         self._ledger = Ledger(self.scene, stage.teams)
         self._episode = Episode(Judgement(""))
         self._learners = any(type(a).process_feedback is not Agent.process_feedback for a in agents)
@@ -84,30 +87,48 @@ class Performance:
         None once their game is over, although the episode may go on until all is decided.
         """
         stage, episode, snapshot, agents = self._stage, self._episode, self.snapshot, self._agents
-        scene = self.scene
-        actions = [agent.choose_action(snapshot) for agent in agents]
+        scene, views = self.scene, self.agent_views
+        actions = [a.choose_action(view) for a, view in zip(agents, views, strict=True)]
         states = _moved(snapshot.testers, stage.teams, actions, scene.dt)
-        command = stage.ego.act(snapshot)
+        command = stage.ego.act(self.ego_view)
         successor = stage.world.step(states, command)
         if successor is None or (isinstance(command, Drive) and _at_end(scene, successor)):
             self.over = True
             rewards = self._ledger.lost()
-            _feed_back(agents, snapshot, actions, rewards, snapshot)
+            _feed_back(agents, views, actions, rewards, views)
             return rewards
         braking = (snapshot.ego.v - successor.ego.v) / scene.dt
         if braking > episode.max_decel:
             episode.max_decel = braking
         _observe(stage, episode, successor, self._record)
         rewards = self._ledger.rewards(successor, [a.judgement for a in stage.assertions])
+        self._show(successor)
         if self._learners:
-            _feed_back(agents, snapshot, actions, rewards, successor)
+            _feed_back(agents, views, actions, rewards, self.agent_views)
         self.snapshot = successor
         self.over = _over(stage, successor)
         return rewards
 
+    @property
+    def contacts(self) -> ContactMonitor:
+        """Who touched whom so far."""
+        return self._episode.contacts
+
+    @property
+    def judgement(self) -> Judgement:
+        """The most serious of what the assertions say so far."""
+        return _worst(self._stage)
+
     def finished(self) -> Episode:
-        """What happened."""
+        """What happened, or what happened so far."""
         return _finished(self._stage, self._episode, self.snapshot, self._ledger)
+
+    def _show(self, snapshot: Snapshot) -> None:
+        """Let everybody see a snapshot: all of it, unless there are sensors."""
+        if self._senses is None:
+            self.ego_view, self.agent_views = snapshot, (snapshot,) * len(self._agents)
+        else:
+            self.ego_view, self.agent_views = self._senses.views(snapshot)
 
 
 def play(
@@ -127,10 +148,10 @@ def play(
 
 def _reset(
     stage: Stage, agents: Sequence[Agent], seed: int, record: bool, simulation: Simulation
-) -> tuple[Scene, Snapshot]:
+) -> tuple[Scene, Snapshot, Senses | None]:
     """Draw the starts and begin an episode; one generator for each who draws."""
-    streams = np.random.SeedSequence(seed).spawn(2 + len(agents))
-    placing, electing, *rest = (np.random.default_rng(s) for s in streams)
+    streams = np.random.SeedSequence(seed)
+    placing, electing, *rest = map(np.random.default_rng, streams.spawn(2 + len(agents)))
     kinds = [body.kind for body in stage.bodies]
     ego = stage.world.ego_body
     starts = stage.site.draw(kinds, ego.kind, stage.start_speed, placing)
@@ -141,7 +162,9 @@ def _reset(
     watching: list[Ego | Agent | Assertion] = [stage.ego, *agents, *stage.assertions]
     # Vehicles keep their distance to whoever is ahead of them, so they see everybody.
     driving = any(start.approach for start in starts)
-    everything = record or driving or any(who.sees_background for who in watching)
+    senses = _senses(stage, scene, streams)
+    everything = record or driving or senses is not None
+    everything = everything or any(who.sees_background for who in watching)
     snapshot = stage.world.reset(
         seed, _states(stage, starts), starts, everything=everything, simulation=simulation
     )
@@ -151,7 +174,18 @@ def _reset(
     stage.ego.reset(scene)
     for assertion in stage.assertions:
         assertion.reset(scene)
-    return scene, snapshot
+    return scene, snapshot, senses
+
+
+def _senses(stage: Stage, scene: Scene, streams: np.random.SeedSequence) -> Senses | None:
+    """The observers of an episode, None with full observability.
+
+    Their generators come after all others, which are the same with sensors and without.
+    """
+    if not (stage.ego_sensor or stage.tester_sensor):
+        return None
+    seeds = streams.spawn(1 + len(stage.teams))
+    return Senses(scene, stage.ego_sensor, stage.tester_sensor, stage.teams, seeds)
 
 
 def _states(stage: Stage, starts: Sequence[Start]) -> list[BodyState]:
@@ -215,15 +249,17 @@ def _observe(stage: Stage, episode: Episode, snapshot: Snapshot, record: bool) -
 
 def _feed_back(
     agents: Sequence[Agent],
-    snapshot: Snapshot,
+    before: Sequence[Snapshot],
     actions: Sequence[tuple[Action, ...]],
     rewards: Feedback | None,
-    successor: Snapshot,
+    after: Sequence[Snapshot],
 ) -> None:
     """ProcessFeedback for every agent, until the game is over."""
     if rewards is None:
         return
-    for agent, action, reward in zip(agents, actions, rewards[0], strict=True):
+    for agent, snapshot, action, reward, successor in zip(
+        agents, before, actions, rewards[0], after, strict=True
+    ):
         agent.process_feedback(snapshot, action, reward, successor, rewards[1])
 
 
@@ -248,8 +284,7 @@ def _at_end(scene: Scene, snapshot: Snapshot) -> bool:
 
 def _finished(stage: Stage, episode: Episode, snapshot: Snapshot, ledger: Ledger) -> Episode:
     """The episode with its totals."""
-    judgements = [a.judgement for a in stage.assertions]
-    episode.judgement = min(judgements, key=lambda j: SEVERITY.index(j.verdict))
+    episode.judgement = _worst(stage)
     episode.steps, episode.time = snapshot.step, snapshot.time
     episode.cost, episode.reward = ledger.cost, ledger.total
     world = stage.world
@@ -257,3 +292,9 @@ def _finished(stage: Stage, episode: Episode, snapshot: Snapshot, ledger: Ledger
     episode.teleports, episode.emergency_stops = world.teleports, world.emergency_stops
     assert math.isfinite(episode.reward)
     return episode
+
+
+def _worst(stage: Stage) -> Judgement:
+    """The most serious judgement."""
+    judgements = [a.judgement for a in stage.assertions]
+    return min(judgements, key=lambda j: SEVERITY.index(j.verdict))

@@ -51,6 +51,8 @@ class Snapshot(NamedTuple):
             those are left out who cannot touch the ego or a tester now (see ``background``).
         lights: what each of ``Scene.lights`` shows the ego, as SUMO's letter (G and g are green, y
             is yellow, r is red); empty when nobody looks, as above.
+        unseen: ids of the ego and of testers whom a tester agent does not see through its sensor
+            (``sensors``): they are shown where it last saw them. None without such a sensor.
     """
 
     step: int
@@ -60,6 +62,12 @@ class Snapshot(NamedTuple):
     testers: tuple[BodyState, ...]
     raw_background: tuple[RawState, ...] = ()
     lights: tuple[str, ...] = ()
+    unseen: frozenset[str] | None = None
+
+    @property
+    def sees_ego(self) -> bool:
+        """Whether the ego is seen where it is."""
+        return not self.unseen or self.ego.body.id not in self.unseen
 
     @property
     def background(self) -> tuple[BodyState, ...]:

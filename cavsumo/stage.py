@@ -11,6 +11,7 @@ from cavsumo.egos import make_ego
 from cavsumo.egos.base import Ego, Mission
 from cavsumo.jobs import teams, tester_bodies
 from cavsumo.scenario import Scenario
+from cavsumo.sensors import Sensor
 from cavsumo.site import Site
 from cavsumo.world import World
 
@@ -25,6 +26,8 @@ class Stage:
         bodies: the testers' bodies.
         horizon: length of an episode [s].
         start_speed: of the testers [m/s]; None for their maximum.
+        ego_sensor, tester_sensor: what the ego and the agents see the others through; None for
+            full observability.
     """
 
     world: World
@@ -35,6 +38,8 @@ class Stage:
     bodies: tuple[Body, ...]
     horizon: float
     start_speed: float | None = None
+    ego_sensor: Sensor | None = None
+    tester_sensor: Sensor | None = None
 
     @property
     def mission(self) -> Mission:
@@ -62,4 +67,6 @@ def set_stage(scenario: Scenario, site: Site, ego: Ego | None = None) -> Stage:
         bodies=tester_bodies(scenario),
         horizon=scenario.end,
         start_speed=scenario.start_speed,
+        ego_sensor=scenario.ego_sensor,
+        tester_sensor=scenario.tester_sensor,
     )

@@ -26,7 +26,7 @@ def stopping_rule(plan: BatchPlan) -> Rule:
     if plan.until_tests is not None:
         rules.append(_enough_tests(plan.until_tests))
     if plan.until_half_width is not None:
-        rules.append(_narrow_enough(plan.until_half_width, plan.until_rate, plan.agents))
+        rules.append(_narrow_enough(plan.until_half_width, plan.until_rate, tuple(plan.cast)))
     if plan.budget_s is not None:
         rules.append(_budget_spent(plan.budget_s))
     return lambda tally: next((said for rule in rules if (said := rule(tally))), None)

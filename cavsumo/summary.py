@@ -1,76 +1,125 @@
-"""The table that ends a batch: what each agent found, with intervals."""
+"""The table that ends a run: what each agent found, with intervals."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
 
 from rich.console import Console
+from rich.measure import Measurement
 from rich.table import Table
 
 from cavsumo.outcomes import cell, is_failure
 from cavsumo.statistics import Rate
-from cavsumo.tally import Found, Row, Tally
+from cavsumo.tally import Found, Row, Tally, found_by
 
-WIDTH = 120  # a table cut off at the edge of a narrow terminal would hide figures
+WIDTH, WIDEST = 120, 1000  # a table cut off at the edge of a narrow terminal would hide figures
 
 
-def summarise(
-    tally: Tally, csv_file: Path, traces: int, *, sequential: bool = False, shared: bool = False
-) -> None:
-    """Print the summary of a batch on stdout.
+@dataclass(frozen=True)
+class Ended:
+    """What a batch came to.
 
-    Args:
+    Attributes:
+        name: which part of a study it is; empty for none.
+        csv_file, tally, traces: its results, what was found, how many traces there are.
         sequential: the number of episodes may depend on what they found, so the intervals must
             hold however it was decided to stop.
         shared: episodes shared simulations, and those played in a fresh one are found tests.
+        cut_short: somebody stopped it.
     """
-    console = Console(width=WIDTH)
-    console.print(_table(tally, sequential), highlight=False)
-    if sequential:
+
+    name: str
+    csv_file: Path
+    tally: Tally
+    traces: int = 0
+    sequential: bool = False
+    shared: bool = False
+    cut_short: bool = False
+
+
+def summarise(ended: Sequence[Ended]) -> None:
+    """Print the summary of one or several batches on stdout."""
+    console, table = Console(width=WIDTH), _table(ended)
+    least = Measurement.get(console, console.options.update(width=WIDEST), table).minimum
+    console.width = max(WIDTH, least)
+    console.print(table, highlight=False)
+    if any(one.sequential for one in ended):
         _say(console, "intervals: beta-binomial confidence sequences, valid whenever one stops")
-    together = tally.all
-    if shared and together.fresh:
-        lost = together.fresh - together.tests
-        _say(
-            console,
-            f"\n{together.fresh} tests found in shared simulations and played again in fresh ones: "
-            f"{lost} ({percent(lost / together.fresh)}) did not come out as tests again",
-        )
-    files = f"{csv_file}, {csv_file.with_suffix('.json')}"
-    if traces:
-        files += f", {csv_file.with_suffix('')}/ ({traces} traces)"
+    together = found_by(found for one in ended for found in one.tally.agents.values())
+    _say_shared(ended, console)
+    rows = sum(one.tally.rows for one in ended)
     _say(
         console,
-        f"\n{together.tests} tests in {tally.rows} episodes, {together.failures} of them failed "
-        f"by the ego.  {files}",
+        f"\n{together.tests} tests in {rows} episodes, {together.failures} of them failed "
+        f"by the ego.  {_files(ended)}",
     )
-    error = tally.first.get("error")
-    if error:
-        _say(
-            console,
-            f"{together.errors} could not be run; run {error['run']}: {cell(error['error'])}"
-            "\n       run again with --retry-errors to play them again",
-        )
+    _say_errors(ended, console)
     if not together.failures and together.tests:
+        sequential = any(one.sequential for one in ended)
         bound = together.rate("failures", sequential=sequential).high
         _say(
             console,
             f"no failure in {together.tests} tests: at most {100 * (bound or 0):.1f} % (95 %)",
         )
-    _say_first(tally, csv_file, console)
+    _say_first(ended, console)
 
 
-def _table(tally: Tally, sequential: bool) -> Table:
-    """One line an agent."""
+def _table(ended: Sequence[Ended]) -> Table:
+    """One line an agent, of each batch."""
+    several = any(one.name for one in ended)
     table = Table(box=None, pad_edge=False, padding=(0, 2, 0, 0))
-    table.add_column("agent")
+    for title in ("batch", "agent") if several else ("agent",):
+        table.add_column(title, overflow="fold")  # a path may be long
     for title in ("runs", "tests", "rate", "95 % interval", "failures", "of tests"):
         table.add_column(title, justify="right", no_wrap=True)
     for title in ("unfair", "errors", "median time"):
         table.add_column(title, justify="right", no_wrap=True)
-    for agent, found in tally.agents.items():
-        table.add_row(agent, *_cells(found, sequential))
+    for one in ended:
+        for i, (agent, found) in enumerate(one.tally.agents.items()):
+            head = [one.name if i == 0 else "", agent] if several else [agent]
+            table.add_row(*head, *_cells(found, one.sequential))
     return table
+
+
+def _files(ended: Sequence[Ended]) -> str:
+    """Where the results lie."""
+    first, last = ended[0], ended[-1]
+    if first is not last:
+        return f"{first.csv_file} to {last.csv_file.name} ({len(ended)} batches)"
+    files = f"{first.csv_file}, {first.csv_file.with_suffix('.json')}"
+    if first.traces:
+        files += f", {first.csv_file.with_suffix('')}/ ({first.traces} traces)"
+    return files
+
+
+def _say_shared(ended: Sequence[Ended], console: Console) -> None:
+    """How many tests that were found in shared simulations did not come out again."""
+    found = [one.tally.all for one in ended if one.shared]
+    fresh, tests = sum(one.fresh for one in found), sum(one.tests for one in found)
+    if fresh:
+        lost = fresh - tests
+        _say(
+            console,
+            f"\n{fresh} tests found in shared simulations and played again in fresh ones: "
+            f"{lost} ({percent(lost / fresh)}) did not come out as tests again",
+        )
+
+
+def _say_errors(ended: Sequence[Ended], console: Console) -> None:
+    """How many episodes could not be run, and the first of them."""
+    errors = sum(one.tally.all.errors for one in ended)
+    for one in ended:
+        row = one.tally.first.get("error")
+        if row is not None:
+            where = f" of {one.csv_file}" if len(ended) > 1 else ""
+            _say(
+                console,
+                f"{errors} could not be run; run {row['run']}{where}: {cell(row['error'])}"
+                "\n       run again with --retry-errors to play them again",
+            )
+            return
 
 
 def _cells(found: Found, sequential: bool) -> list[str]:
@@ -90,20 +139,22 @@ def _cells(found: Found, sequential: bool) -> list[str]:
     ]
 
 
-def _say_first(tally: Tally, csv_file: Path, console: Console) -> None:
+def _say_first(ended: Sequence[Ended], console: Console) -> None:
     """Point to the first failure, else the first test, and how to see it again."""
     for what in ("failure", "test"):
-        row = tally.first.get(what)
-        if row is not None:
-            _say(
-                console,
-                f"first {what}: run {row['run']} ({row['agent']}): {_event(row)}"
-                f"\n       cavsumo replay {csv_file} {row['run']}",
-            )
-            return
+        for one in ended:
+            row = one.tally.first.get(what)
+            if row is not None:
+                _say(
+                    console,
+                    f"first {what}: run {row['run']} ({row['agent']}): {event(row)}"
+                    f"\n       cavsumo replay {one.csv_file} {row['run']} --html "
+                    f"run{row['run']}.html",
+                )
+                return
 
 
-def _event(row: Row) -> str:
+def event(row: Row) -> str:
     """What happened in a test, when and with whom."""
     violated = is_failure(row)
     when = float(row["violation_time_s"] if violated else row["trigger_time_s"])

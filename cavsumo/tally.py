@@ -104,11 +104,16 @@ class Tally:
     @property
     def all(self) -> Found:
         """What all agents found together."""
-        together = Found()
-        for found in self.agents.values():
-            together.outcomes.update(found.outcomes)
-            together.fresh += found.fresh
-        return together
+        return found_by(self.agents.values())
+
+
+def found_by(agents: Iterable[Found]) -> Found:
+    """What several agents found together, but for the times."""
+    together = Found()
+    for found in agents:
+        together.outcomes.update(found.outcomes)
+        together.fresh += found.fresh
+    return together
 
 
 def tallied(rows: Iterable[Row]) -> Found:

@@ -4,16 +4,18 @@ from __future__ import annotations
 
 import time
 from collections.abc import Sequence
+from functools import cached_property
 from typing import Any
 
 from cavsumo.agents import Agent
-from cavsumo.errors import CavsumoError
-from cavsumo.jobs import Job, episode_seed, failed, head, make_agents
-from cavsumo.outcomes import Outcome, Row, frame, trace_text
+from cavsumo.errors import CavsumoError, EgoError
+from cavsumo.jobs import Job, episode_seed, failed_row, head, make_agents
+from cavsumo.outcomes import Outcome, Row
 from cavsumo.scenario import BatchPlan, Simulation
 from cavsumo.simulator import Episode, play
 from cavsumo.site import Site
 from cavsumo.stage import set_stage
+from cavsumo.traces import frame, origin, trace_head, trace_text
 
 
 class Theatre:
@@ -30,9 +32,22 @@ class Theatre:
     def __exit__(self, *_: object) -> None:
         self.stage.close()
 
-    def rehearse(self) -> None:
-        """Start the ego and SUMO once: what they refuse comes out before anything is written."""
-        self.stage.ego.prepare(self.stage.mission)
+    @cached_property
+    def _origin(self) -> dict[str, Any]:
+        """What the traces of all episodes have in common."""
+        return origin(self.plan, self.stage.site)
+
+    def rehearse(self, *, strict: bool = True) -> None:
+        """Start the ego and SUMO once: what they refuse comes out before anything is written.
+
+        In the middle of a batch, not ``strict``, an ego that cannot be started is no refusal: each
+        episode tries again, and is an error if that fails.
+        """
+        try:
+            self.stage.ego.prepare(self.stage.mission)
+        except EgoError:
+            if strict:
+                raise
         simulation: Simulation = "own" if self.plan.reset == "fresh" else "new"
         self.stage.world.reset(episode_seed(self.plan.seed, 0), (), (), simulation=simulation)
 
@@ -41,6 +56,7 @@ class Theatre:
         begun = time.perf_counter()
         try:
             agents = self._cast(job)
+            before = _recall(agents)
             episode = play(
                 self.stage,
                 agents,
@@ -48,14 +64,14 @@ class Theatre:
                 record=job.record or (self.plan.trace != "none" and job.simulation == "own"),
                 simulation=job.simulation,
             )
-            row = _row(self.plan, job, episode)
-            trace = self._trace(job, row, episode)
+            row = head(self.plan, job) | measured(episode)
+            trace = self._trace(job, row, before, episode)
             memory = _recall(agents)
         except Exception as error:  # whatever it is, it costs this row and no other
             said = str(error) if isinstance(error, CavsumoError) else f"defect: {error!r}"
-            return failed(self.plan, job, said, time.perf_counter() - begun), job.memory
+            row, trace, memory = failed_row(self.plan, job, said), "", job.memory
         row["wall_s"] = time.perf_counter() - begun
-        return Outcome(row, trace), memory
+        return Outcome(row, trace, self.stage.ego.take_log()), memory
 
     def _cast(self, job: Job) -> list[Agent]:
         """The agents of a job, with their memory."""
@@ -68,18 +84,19 @@ class Theatre:
             agent.remember(memory)
         return agents
 
-    def _trace(self, job: Job, row: Row, episode: Episode) -> str:
+    def _trace(self, job: Job, row: Row, memory: Any, episode: Episode) -> str:
         """The frames worth keeping: of tests found, or of every episode if asked."""
         if episode.frames and (job.record or episode.judgement.triggered):
-            return trace_text(row, map(frame, episode.frames))
+            first = trace_head(self._origin, row, memory, episode.frames)
+            return trace_text(first, map(frame, episode.frames))
         return ""
 
 
-def _row(plan: BatchPlan, job: Job, episode: Episode) -> Row:
-    """The row of a finished episode."""
+def measured(episode: Episode) -> Row:
+    """The columns of a row that a finished episode fills."""
     judgement, contacts = episode.judgement, episode.contacts
     with_ego = {pair for pair in episode.sumo_collisions if "ego" in pair}
-    return head(plan, job) | {
+    return {
         "outcome": judgement.verdict,
         "assertion": judgement.assertion if judgement.triggered else "",
         "tester": judgement.tester,

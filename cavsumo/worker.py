@@ -25,12 +25,14 @@ from typing import Any
 from cavsumo.errors import BatchError, InputError
 from cavsumo.jobs import Job, failed
 from cavsumo.outcomes import Outcome, is_test
+from cavsumo.processes import ending, inner_environment
 from cavsumo.scenario import Simulation
 from cavsumo.setting import Setting
 from cavsumo.worker_process import GOODBYE
 
-STARTUP_S = 60.0  # imports and SUMO's first start, on a slow machine
+STARTUP_S = 120.0  # imports, SUMO's first start and that of the ego, on a slow machine
 STUCK_S = 20  # how long a message may stop half-way
+DISMISSAL_S = 3.0  # how long a process may take to end by itself
 ATTEMPTS = 5  # to start a process that dies while it starts
 LIFETIME = 10_000  # episodes that one process plays; SUMO leaks a little with every restart
 Answer = tuple[Outcome, Any]  # an outcome, and what the agents know afterwards
@@ -56,7 +58,7 @@ class Worker:
     def start(self) -> None:
         """Start the process; raises InputError when it refuses the setting."""
         with self._busy:
-            self._start()
+            self._start(strict=True)
 
     def play(self, job: Job) -> Answer:
         """The outcome of a job and the agents' memory after it; a crash is an outcome too.
@@ -75,20 +77,26 @@ class Worker:
                 return failed(self.setting.plan, job, str(gone), wall), job.memory
 
     def close(self) -> None:
-        """End the process at once and for good, also while another thread waits for it."""
+        """End the process for good: in peace, or at once while another thread waits for it."""
         self.closed = True
-        if self._process is not None:
+        if self._busy.acquire(blocking=False):
+            self._dismiss()
+            self._busy.release()
+        elif self._process is not None:
             _kill(self._process)
         with self._busy:
             self._stop()
         _WORKERS.discard(self)
 
-    def _start(self) -> None:
-        """Start the process, wait until it has rehearsed; nothing to do if it runs."""
+    def _start(self, *, strict: bool) -> None:
+        """Start the process, wait until it has rehearsed; nothing to do if it runs.
+
+        Strict, an ego that cannot be started is a reason to refuse.
+        """
         for _ in range(ATTEMPTS):
             if self._process is not None:
                 return
-            self._launch()
+            self._launch(strict)
             try:
                 refusal = self._receive(STARTUP_S)
             except _Gone as gone:
@@ -105,7 +113,7 @@ class Worker:
         """Have a job played, by a new process if the old one is no more."""
         for _ in range(ATTEMPTS):
             try:
-                self._start()
+                self._start(strict=False)
             except InputError as error:  # it could be started when the batch began
                 raise BatchError(f"no process to simulate in: {error}") from error
             try:
@@ -121,7 +129,7 @@ class Worker:
             self._stop()
         raise _Gone("the simulation process died again and again while it waited")
 
-    def _launch(self) -> None:
+    def _launch(self, strict: bool) -> None:
         """Start the process and hand over the setting."""
         if self.closed:
             raise BatchError("the batch is over")
@@ -132,10 +140,8 @@ class Worker:
         _limit(self._pipe)
         fds = theirs.fileno(), self._log.fileno()
         numbers = (*fds, os.getpid())
-        environment = os.environ | {
-            "PYTHONPATH": os.pathsep.join(sys.path),
-            "TMPDIR": self._folder.name,  # what a killed process leaves goes with this folder
-        }
+        # what a killed process leaves goes with this folder
+        environment = inner_environment() | {"TMPDIR": self._folder.name}
         _WORKERS.add(self)
         try:
             self._process = subprocess.Popen(
@@ -155,7 +161,7 @@ class Worker:
         if self.closed:  # by another thread, which saw no process yet
             _kill(self._process)
         with contextlib.suppress(OSError):  # it died already, as _receive will find
-            self._pipe.send(self.setting)
+            self._pipe.send((self.setting, strict))
 
     def _receive(self, deadline: float) -> Any:
         """What the process sends, or _Gone when it died or took too long."""
@@ -175,10 +181,7 @@ class Worker:
             code = self._process.wait(5.0)
         except subprocess.TimeoutExpired:
             return "the simulation process closed its pipe, killed"
-        if code < 0:
-            names = {s.value: s.name for s in signal.Signals}
-            return f"the simulation process died of {names.get(-code, f'signal {-code}')}"
-        return f"the simulation process ended with status {code}"
+        return f"the simulation process {ending(code)}"
 
     def _last_words(self) -> str:
         """The last line that the process printed below Python."""
@@ -186,6 +189,13 @@ class Worker:
         text = self._log.read().decode("utf-8", errors="replace")
         lines = [line.strip() for line in text.splitlines() if line.strip()]
         return f" ({lines[-1]})" if lines else ""
+
+    def _dismiss(self) -> None:
+        """Let a process that waits for a job end by itself, and so its ego."""
+        if self._process is not None:
+            self._pipe.close()
+            with contextlib.suppress(subprocess.TimeoutExpired):
+                self._process.wait(DISMISSAL_S)
 
     def _stop(self) -> None:
         """End the process and what belongs to it."""

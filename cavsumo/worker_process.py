@@ -8,7 +8,6 @@ neither Python nor the pipe is heard, on any system.
 from __future__ import annotations
 
 import contextlib
-import ctypes
 import os
 import signal
 import sys
@@ -16,38 +15,40 @@ from multiprocessing.connection import Connection
 
 from cavsumo.errors import CavsumoError
 from cavsumo.jobs import Job
+from cavsumo.processes import leash
 from cavsumo.setting import Setting
 
 IDLE_S = 60.0  # a process with nothing to do for so long goes
 GOODBYE = "goodbye"  # its last message then
 ALARM_AFTER_S = 30.0  # how long after an episode's deadline the process ends itself
-PR_SET_PDEATHSIG = 1  # Linux, prctl(2)
 
 
 def main(pipe_fd: int, log_fd: int, parent: int) -> None:
     """Set up what the first message describes, say so, then play."""
-    _die_with(parent)
+    leash(parent)()
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # the parent decides what Ctrl-C means
     signal.signal(signal.SIGALRM, signal.SIG_DFL)
-    _divert_output(log_fd)
+    divert_output(log_fd)
     pipe = Connection(pipe_fd)
     with contextlib.suppress(EOFError, ConnectionError):  # the parent is gone or has no more jobs
-        _serve(pipe, pipe.recv())
+        _serve(pipe, *pipe.recv())
+    sys.stderr.flush()
+    os._exit(0)  # taking Python and its libraries apart takes longer than an episode
 
 
-def _serve(pipe: Connection, setting: Setting) -> None:
+def _serve(pipe: Connection, setting: Setting, strict: bool) -> None:
     """Rehearse once, then play; a refusal is sent instead of None."""
     from cavsumo.theatre import Theatre
 
-    try:
-        setting.check_here()
-        theatre = Theatre(setting.plan, setting.site)
-        theatre.rehearse()
-    except (CavsumoError, OSError) as error:
-        pipe.send(str(error))
-        return
-    pipe.send(None)
-    with theatre:
+    with contextlib.ExitStack() as stack:
+        try:
+            setting.check_here()
+            theatre = stack.enter_context(Theatre(setting.plan, setting.site))
+            theatre.rehearse(strict=strict)
+        except (CavsumoError, OSError) as error:
+            pipe.send(str(error))
+            return
+        pipe.send(None)
         while pipe.poll(IDLE_S):
             job: Job = pipe.recv()
             signal.setitimer(signal.ITIMER_REAL, setting.plan.deadline_s + ALARM_AFTER_S)
@@ -57,15 +58,7 @@ def _serve(pipe: Connection, setting: Setting) -> None:
         pipe.send(GOODBYE)
 
 
-def _die_with(parent: int) -> None:
-    """Ask Linux to kill this process when its parent dies."""
-    if sys.platform == "linux":
-        ctypes.CDLL(None).prctl(PR_SET_PDEATHSIG, signal.SIGKILL)
-    if os.getppid() != parent:  # it has died already
-        os._exit(1)
-
-
-def _divert_output(log_fd: int) -> None:
+def divert_output(log_fd: int) -> None:
     """Send what SUMO prints to a file; what Python prints goes to the real stderr."""
     sys.stdout = sys.stderr = os.fdopen(os.dup(2), "w", buffering=1)
     os.dup2(log_fd, 1)

@@ -22,7 +22,7 @@ import shapely
 from cavsumo.background import Background, Roaming, roaming
 from cavsumo.bodies import PEDESTRIAN, Body
 from cavsumo.egos.base import Acceleration, Command, Drive, Ego
-from cavsumo.errors import NoSuchAction, SimulationError
+from cavsumo.errors import NoSuchAction, SimulationError, SimulationTaken
 from cavsumo.geometry import Box, gap
 from cavsumo.kinematics import steering_for_turn, step_floats, wrap
 from cavsumo.roads import Start
@@ -42,10 +42,14 @@ KEEP_EXACT_ANY_LANE = 6  # the same for persons, on lanes for cars too
 MATCH_M = 5.0
 ROOM_M = 2.0  # traffic nearer to a tester vehicle than this at the start is taken away
 UNSAFE = 0  # setSpeedMode: no check of SUMO's own interferes with what was commanded
+# Which world of this process has its one simulation: the one that began an episode last.
+_PLAYING: list[object] = [None]
 
 
 class World:
     """One SUMO simulation at a time; a context manager.
+
+    A world that begins an episode takes the simulation from whichever had it in this process.
 
     Attributes:
         simulations: starts and advances SUMO.
@@ -63,6 +67,7 @@ class World:
         self._heard = (folder / "stderr.log").open("ab")
         self.simulations = Simulations(libsumo, scenario, site, ego, folder)
         self._roaming: Roaming | None = None
+        self._mark = object()  # stands for this world in _PLAYING without keeping it alive
         shapely.prepare(site.crossings)
 
     def __enter__(self) -> World:
@@ -72,8 +77,10 @@ class World:
         self.close()
 
     def close(self) -> None:
-        """End the simulation; harmless when there is none."""
-        libsumo.close()
+        """End the simulation; harmless when there is none, or when another world has it."""
+        if _PLAYING[0] in (None, self._mark):
+            libsumo.close()
+            _PLAYING[0] = None
         self._heard.close()
         self._folder.cleanup()
 
@@ -103,6 +110,9 @@ class World:
         self._told: dict[str, tuple[BodyState, tuple[float, float, float]]] = {}
         self._step, self._steering = 0, 0.0
         self._vehicles: tuple[str, ...] = ()
+        if simulation == "same":
+            self._check_own()
+        _PLAYING[0] = self._mark
         with self._listening():
             self.simulations.begin(seed, simulation)
             self._insert(states, starts)
@@ -119,7 +129,11 @@ class World:
         Args:
             states: where the testers are at its end.
             command: what the ego does during it.
+
+        Raises SimulationTaken when another world has begun an episode meanwhile.
         """
+        if _PLAYING[0] is not self._mark:
+            self._check_own()
         try:
             self._place(states)
             self._command_ego(command)
@@ -135,6 +149,14 @@ class World:
             self._steering = self._implied_steering(ego)
         self._ego = ego
         return self._snapshot(ego, states)
+
+    def _check_own(self) -> None:
+        """Refuse to go on in a simulation that is another world's by now, or nobody's."""
+        if _PLAYING[0] is not self._mark:
+            raise SimulationTaken(
+                "this process has one simulation, and another world took or closed it; begin a new "
+                "episode here, or play each world in a process of its own"
+            )
 
     @contextmanager
     def _listening(self) -> Iterator[None]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import importlib
 import math
 import sys
@@ -11,18 +12,23 @@ from typing import Any
 
 import pytest
 from shapely.geometry import LineString, box
+from support import CHROMIUM, LAPTOP, OPTIONS
 
 from cavsumo.agents.base import Scene
 from cavsumo.bodies import PEDESTRIAN, Body, Kind
 from cavsumo.cli import main
 from cavsumo.egos import make_ego
 from cavsumo.egos.base import EGO_KIND
+from cavsumo.jobs import job
 from cavsumo.paths import Path as Polyline
+from cavsumo.replays import Record
 from cavsumo.roads import Roads, Start
 from cavsumo.scenario import BatchPlan, plan_from
 from cavsumo.setting import Setting, checksums, prepare, versions
 from cavsumo.site import Site
 from cavsumo.snapshot import BodyState, Snapshot
+from cavsumo.theatre import Theatre
+from cavsumo.traces import Trace, parsed
 from cavsumo.world import World
 
 ROOT = Path(__file__).parents[1]
@@ -214,3 +220,64 @@ def _start(x: float, y: float, o: float, open_plane: bool) -> Start:
     along = pavement.project(x, y)
     forwards = math.cos(o - pavement.at(along.along)[2]) >= 0
     return Start(x, y, o, pavement, along.lateral, forwards)
+
+
+@pytest.fixture(scope="session")
+def shown(staged: Callable[..., tuple[BatchPlan, Site]]) -> tuple[Record, Trace, Site]:
+    """An episode at the Helsinki crossing in which the ego hits a tester, recorded."""
+    plan, site = staged("crossing", agents=["timing"], routes="auto")
+    with Theatre(plan, site) as theatre:
+        outcome, _ = theatre.play(dataclasses.replace(job(plan, 1), record=True))
+    trace = parsed(outcome.trace)
+    return Record(plan, trace.row, trace, trace.head, Path("results.csv")), trace, site
+
+
+@pytest.fixture(scope="module")
+def browser() -> Iterator[Any]:
+    """Chromium as Debian has it, driven by playwright."""
+    if CHROMIUM is None:
+        pytest.skip("no chromium here: apt-get install chromium")
+    api = pytest.importorskip("playwright.sync_api", reason="no playwright: pip install playwright")
+    with api.sync_playwright() as playwright:
+        running = playwright.chromium.launch(executable_path=CHROMIUM, args=OPTIONS)
+        yield running
+        running.close()
+
+
+@pytest.fixture
+def open_page(browser: Any) -> Iterator[Callable[..., Any]]:
+    """Call with a page, a viewport and such; whatever it complains about fails the test."""
+    complaints: list[str] = []
+    requests: list[tuple[str, str]] = []
+    contexts: list[Any] = []
+
+    def opened(which: Path, viewport: dict[str, int] = LAPTOP, **how: Any) -> Any:
+        context = browser.new_context(viewport=viewport, **how)
+        contexts.append(context)
+        page = context.new_page()
+        page.set_default_timeout(20_000)
+        page.on("console", lambda message: complaints.append(message.text))
+        page.on("pageerror", lambda error: complaints.append(str(error)))
+        page.on("dialog", lambda dialog: complaints.append(f"dialog {dialog.message}"))
+        page.on("request", lambda r: requests.append((r.url, r.resource_type)))
+        page.goto(which.as_uri())
+        return page
+
+    yield opened
+    for context in contexts:
+        context.close()
+    assert complaints == []
+    # pages are files, and load nothing beside themselves
+    assert [url for url, _ in requests if not url.startswith("file:")] == []
+    assert {sort for _, sort in requests} == {"document"}
+
+
+@pytest.fixture(scope="session")
+def found_failure(networks: dict[str, Path], tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The results of a small batch at the Helsinki crossing, with tests and failures."""
+    file = tmp_path_factory.mktemp("found") / "found.csv"
+    words = ["run", "-n", str(networks["crossing"]), "-o", str(file), "-q", "--exit-zero"]
+    assert (
+        main([*words, "--agent", "proximity", "--agent", "timing", "--runs", "8", "-j", "2"]) == 0
+    )
+    return file

@@ -202,6 +202,15 @@ def test_weights_come_from_a_file(tmp_path: Path) -> None:
     assert agent.recall() == memory(bias=1.5, timely=-3.0)
 
 
+@pytest.mark.parametrize("others", [{}, {"q-learning": [memory(bias=2.0)]}])
+def test_weights_come_from_the_manifest_of_a_batch(tmp_path: Path, others: dict[str, Any]) -> None:
+    """From the learner without a label, or from the only one."""
+    file = tmp_path / "results.json"
+    file.write_text(json.dumps({"learned": {"wild": [memory(bias=1.5)]} | others}))
+    agent = AGENTS.make("q-learning", {"weights": str(file)})
+    assert agent.recall() == memory(bias=2.0 if others else 1.5)
+
+
 def test_without_learning_nothing_changes(straight_scene: MakeScene, scene_snapshot: See) -> None:
     """Weights that are only played stay as they are, greedily, and no episode is counted."""
     scene = straight_scene(STANDING)
@@ -225,6 +234,7 @@ def test_without_learning_nothing_changes(straight_scene: MakeScene, scene_snaps
         json.dumps(memory(near=math.nan)),
         json.dumps(memory(near=math.inf)),
         json.dumps({"weights": dict.fromkeys(FEATURES, "much")}),
+        json.dumps({"learned": {"wild": [memory()], "tame": [memory()]}}),
     ],
 )
 def test_bad_weights_are_refused(tmp_path: Path, text: str | None) -> None:

@@ -157,9 +157,10 @@ def test_agents_take_turns_as_the_file_says_and_the_command_line_overrules(town:
     ("words", "said"),
     [
         ("agents", ["noop", "random", "proximity", "timing", "election", "q-learning"]),
-        ("egos", ["sumo", "constant", "time-gap"]),
+        ("egos", ["sumo", "constant", "time-gap", "module:Class", "exec:COMMAND", "tcp:HOST"]),
         ("assertions", ["reaction-zone", "collision"]),
         ("agents proximity", ["distance_m=34.0", "[m]"]),
+        ("egos exec", ["exec: A program", "reply_s=1.0", "length=4.5", "[s]"]),
         ("egos sumo", ["carFollowModel=Krauss", "actionStepLength=1.0", "[s]"]),
         ("assertions reaction-zone", ["reaction_time=0.675", "[m/s2]"]),
         ("run --help", ["--net", "--agent", "--runs", "--output"]),

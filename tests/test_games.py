@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import hashlib
-import importlib.util
 import json
 import math
 from fractions import Fraction
@@ -12,6 +11,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from support import benchmark
 
 from cavsumo.games import (
     Game,
@@ -46,20 +46,10 @@ LISTED = [name for name, case in CASES.items() if "transitions" in case]
 READINGS = list(Reading)
 
 
-def rings() -> Any:
-    """The games that are given by rule."""
-    spec = importlib.util.spec_from_file_location("rings", ROOT / "benchmarks" / "rings.py")
-    assert spec is not None
-    assert spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
-
-
 @pytest.fixture(scope="module")
 def ring() -> Game:
     """The vector with 1,800 states."""
-    return rings().two_pedestrians(24, 7)
+    return benchmark("rings").two_pedestrians(24, 7)
 
 
 def numbers(values: list[str]) -> list[float]:
@@ -392,6 +382,6 @@ def test_the_ego_must_have_its_actions_everywhere_in_b_and_c() -> None:
 
 def test_the_checksum_of_the_rules() -> None:
     """The dense table of successors is, byte for byte, the one of the vectors."""
-    table = rings().successors_of_two(24, 7)
+    table = benchmark("rings").successors_of_two(24, 7)
     found = hashlib.sha256(table.astype("<u4").tobytes()).hexdigest()
     assert found == CASES["ped_car_ring_24"]["sha256_next_state_uint32_le"]

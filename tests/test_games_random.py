@@ -2,17 +2,16 @@
 
 from __future__ import annotations
 
-import importlib.util
 import itertools
 import math
 from fractions import Fraction
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 from hypothesis import HealthCheck, assume, given, settings
 from hypothesis import strategies as st
+from support import benchmark
 
 from cavsumo.games import (
     Game,
@@ -28,8 +27,6 @@ from cavsumo.games import (
 )
 from cavsumo.games.build import from_arrays
 from cavsumo.games.matrix_games import solve as solve_matrices
-
-BENCHMARKS = Path(__file__).parents[1] / "benchmarks"
 
 
 @st.composite
@@ -143,12 +140,7 @@ def random_game(rng: np.random.Generator, states: int, many: int, wide: int) -> 
 def storm() -> Any:
     """The benchmark's bridge to Storm, where it is installed."""
     pytest.importorskip("stormpy")
-    spec = importlib.util.spec_from_file_location("storm", BENCHMARKS / "storm.py")
-    assert spec is not None
-    assert spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
+    return benchmark("storm")
 
 
 @pytest.mark.parametrize("seed", range(4))

@@ -15,10 +15,11 @@ from hypothesis import strategies as st
 
 from cavsumo.bodies import CAR, PEDESTRIAN, Body
 from cavsumo.errors import ResultsError
-from cavsumo.outcomes import COLUMNS, Outcome, Row, cell, frame, trace_text
+from cavsumo.outcomes import COLUMNS, Outcome, Row, cell
 from cavsumo.recorder import Recorder
-from cavsumo.results import FORMAT, read_manifest, read_results, read_rows, read_trace
+from cavsumo.results import FORMAT, read_manifest, read_results, read_rows
 from cavsumo.snapshot import BodyState, Snapshot
+from cavsumo.traces import frame, read_trace, trace_head, trace_text
 
 finite = st.floats(allow_nan=False, allow_infinity=False)
 
@@ -29,18 +30,24 @@ def row(run: int, **more: Any) -> dict[str, Any]:
     return head | {"outcome": "not_triggered", "wall_s": 0.5} | more
 
 
-def seen(step: int, x: float = 1.0) -> dict[str, Any]:
-    """A frame with an ego, a tester and a background car."""
+def snapshot(step: int, x: float = 1.0) -> Snapshot:
+    """An ego, a tester and a background car."""
     ego = BodyState(Body("ego", CAR), x, 2.0, 3.0, 0.5)
     tester = BodyState(Body("tester0", PEDESTRIAN), 5.0, 6.0, 1.0, -0.5)
     other = (Body("car0", CAR), 9.0, 9.0, 9.0, 3.0)
-    return frame(Snapshot(step, 0.1 * step, ego, 0.25, (tester,), (other,)))
+    return Snapshot(step, 0.1 * step, ego, 0.25, (tester,), (other,))
+
+
+def seen(step: int, x: float = 1.0) -> dict[str, Any]:
+    """That as a frame."""
+    return frame(snapshot(step, x))
 
 
 def played(run: int, *frames: dict[str, Any], **more: Any) -> Outcome:
     """The outcome of an episode, with a trace if there are frames."""
     mine = row(run, **more)
-    return Outcome(mine, trace_text(mine, frames) if frames else "")
+    head = trace_head({"plan": {}}, mine, None, [snapshot(0)])
+    return Outcome(mine, trace_text(head, frames) if frames else "")
 
 
 @contextmanager
@@ -178,17 +185,42 @@ def test_a_trace_lies_where_its_row_says(tmp_path: Path) -> None:
         recorder.write(played(5))
     with_trace, without = read_rows(file)
     assert with_trace["trace"] == returned["trace"] == "r/run000004.jsonl"
-    assert read_trace(tmp_path / with_trace["trace"]) == [seen(0), seen(1)]
+    assert read_trace(tmp_path / with_trace["trace"]).frames == [seen(0), seen(1)]
     assert without["trace"] == ""
     assert recorder.traces == 1
 
 
 def test_a_trace_begins_with_whose_it_is(tmp_path: Path) -> None:
-    """The first line names the episode, so that a trace alone can be traced back."""
+    """The first line holds the row, but for what no replay repeats, and everybody's box."""
     with recording(tmp_path / "r.csv") as recorder:
         recorder.write(played(4, seen(0)))
-    head = json.loads((tmp_path / "r" / "run000004.jsonl").read_text().splitlines()[0])
-    assert head == {k: row(4)[k] for k in ("run", "agent", "ego", "seed", "outcome", "tester")}
+    trace = read_trace(tmp_path / "r" / "run000004.jsonl")
+    assert trace.row == {c: cell(row(4).get(c)) for c in COLUMNS if c not in ("trace", "wall_s")}
+    car = ("car", CAR.length, CAR.width, CAR.wheelbase)
+    assert trace.shapes()["ego"] == trace.shapes()["car0"] == car
+    assert trace.shapes()["tester0"].kind == "pedestrian"
+
+
+def test_a_trace_says_when_a_memory_was_left_out() -> None:
+    """What an agent knew is kept unless it is large; then the head says so."""
+    heads = [trace_head({}, row(0), memory, []) for memory in ([0.5], [0.5] * 100_000)]
+    assert [head["memory"] for head in heads] == [[0.5], None]
+    assert [head["memory_kept"] for head in heads] == [True, False]
+
+
+@pytest.mark.parametrize(
+    "line",
+    ['{"a": 1}', '{"step": 0, "time_s": 0, "ego": [1, 2], "steering": 0, "testers": {}, '
+     '"background": {}}', "[1, 2]", "nonsense"],
+)  # fmt: skip
+def test_lines_that_are_no_frames_are_refused(tmp_path: Path, line: str) -> None:
+    """Keys or numbers missing: one sentence with the file's name."""
+    with recording(tmp_path / "r.csv") as recorder:
+        recorder.write(played(0, seen(0)))
+    file = tmp_path / "r" / "run000000.jsonl"
+    file.write_text(file.read_text() + line + "\n", encoding="utf-8")
+    with pytest.raises(ResultsError, match=r"run000000\.jsonl"):
+        read_trace(file)
 
 
 @settings(deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
@@ -197,7 +229,7 @@ def test_traces_keep_full_precision(tmp_path: Path, x: float) -> None:
     """What is read is bit for bit what was written: a replay is compared with it."""
     with recording(tmp_path / "r.csv") as recorder:
         recorder.write(played(0, seen(0, x)))
-    (again,) = read_trace(tmp_path / "r" / "run000000.jsonl")
+    (again,) = read_trace(tmp_path / "r" / "run000000.jsonl").frames
     assert again["ego"][0] == x
     assert math.copysign(1.0, again["ego"][0]) == math.copysign(1.0, x)
 

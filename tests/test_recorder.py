@@ -22,9 +22,10 @@ RUNS = 4
 
 
 def outcome(run: int, **more: Any) -> Outcome:
-    """An episode, those with odd numbers with a trace."""
+    """An episode, those with odd numbers with a trace, those from 2 on with an ego's log."""
     row = {"run": run, "agent": "noop", "outcome": "not_triggered", "time_s": 1.5, "wall_s": 0.25}
-    return Outcome(row | more, f'{{"run": {run}}}\n' if run % 2 else "")
+    trace, log = f'{{"run": {run}}}\n' if run % 2 else "", f"said {run}\n" if run >= 2 else ""
+    return Outcome(row | more, trace, log)
 
 
 def write(file: Path, runs: Sequence[int] = range(RUNS), status: str = "finished") -> None:
@@ -117,12 +118,13 @@ def test_traces_behind_the_last_row_go_and_all_others_stay(
     traces = file.with_suffix("")
     (traces / "run000002.jsonl").write_text("half a tra", encoding="utf-8")
     (traces / "run000777.jsonl").write_text("of a longer batch", encoding="utf-8")
-    for name in ("notes.txt", "runtimes.jsonl", "my-run000777.jsonl"):
+    (traces / "run000778.ego.log").write_text("of a longer batch", encoding="utf-8")
+    for name in ("notes.txt", "runtimes.jsonl", "my-run000777.jsonl", "runs.ego.log"):
         (traces / name).write_text("mine", encoding="utf-8")
     resume(file)
     kept = content(file.parent)
     assert {k: v for k, v in kept.items() if v != b"mine"} == whole
-    assert len(kept) == len(whole) + 3
+    assert len(kept) == len(whole) + 4
 
 
 def test_more_episodes_are_appended(file: Path, tmp_path: Path) -> None:
@@ -151,15 +153,16 @@ def test_replaced_rows_stand_where_the_old_ones_stood(file: Path, whole: dict[st
 
 
 def test_a_replacement_without_a_trace_removes_the_old_one(file: Path) -> None:
-    """What was a test and is none any more leaves no trace behind."""
+    """What was a test and is none any more leaves no trace behind, nor an ego's log."""
     with Recorder(file) as recorder:
         recorder.begin(PLAN)
         for run in range(RUNS):
             recorder.write(outcome(run))
-        recorder.replace({1: Outcome(outcome(1).row)})
+        recorder.replace({run: Outcome(outcome(run).row) for run in (1, 2)})
         recorder.finish("finished", {})
     assert [row["trace"] for row in read_rows(file)] == ["", "", "", "r/run000003.jsonl"]
-    assert [f.name for f in file.with_suffix("").iterdir()] == ["run000003.jsonl"]
+    left = {f.name for f in file.with_suffix("").iterdir()}
+    assert left == {"run000003.jsonl", "run000003.ego.log"}
 
 
 def test_replaced_traces_are_counted_once(file: Path) -> None:
@@ -170,7 +173,7 @@ def test_replaced_traces_are_counted_once(file: Path) -> None:
             recorder.write(outcome(run))
         recorder.replace({run: outcome(run) for run in range(RUNS)})
         recorder.finish("finished", {})
-        assert recorder.traces == len(list(file.with_suffix("").iterdir())) == 2
+        assert recorder.traces == len(list(file.with_suffix("").glob("*.jsonl"))) == 2
 
 
 def test_the_lock_survives_a_replacement(file: Path) -> None:

@@ -7,8 +7,9 @@ from pathlib import Path
 
 import pytest
 
+from cavsumo.config import read_config
 from cavsumo.errors import InputError, UnknownName
-from cavsumo.scenario import BatchPlan, plan_from, read_config
+from cavsumo.scenario import BatchPlan, plan_from
 
 
 @pytest.fixture
@@ -65,9 +66,8 @@ def test_a_file_makes_a_plan(tmp_path: Path, networks: Mapping[str, Path]) -> No
     plan = plan_from(read_config(file), str(file))
     assert (plan.agents, plan.runs, plan.scenario.ego) == (("proximity", "timing"), 7, "constant")
     assert (plan.scenario.testers, plan.scenario.end) == (2, 20.0)
-    known = {"proximity": ["distance_m"], "timing": ["aim"]}
-    assert plan.agent_params("timing", known) == {"aim": 0.3}
-    assert plan.agent_params("proximity", known) == {"distance_m": 12}
+    assert plan.agent_params("timing", ["aim"]) == {"aim": 0.3}
+    assert plan.agent_params("proximity", ["distance_m"]) == {"distance_m": 12}
 
 
 def test_an_unknown_key_suggests_the_nearest(tmp_path: Path) -> None:

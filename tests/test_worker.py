@@ -329,7 +329,7 @@ def test_a_process_with_nothing_to_do_says_goodbye(
     """It goes by itself after a while, so that dask workers and open sessions hold no SUMO."""
     monkeypatch.setattr(worker_process, "IDLE_S", 0.2)
     ours, theirs = Pipe()
-    serving = threading.Thread(target=worker_process._serve, args=(theirs, setting))
+    serving = threading.Thread(target=worker_process._serve, args=(theirs, setting, True))
     serving.start()
     try:
         assert ours.poll(PATIENCE_S)

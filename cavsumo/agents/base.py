@@ -7,7 +7,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from cavsumo.bodies import NOOP, Action
+from cavsumo.bodies import NOOP, Action, Kind
 from cavsumo.registry import Registry
 from cavsumo.scene import Scene
 from cavsumo.snapshot import BodyState, Snapshot
@@ -32,6 +32,9 @@ class Agent:
     scene: Scene
     owned: tuple[int, ...]
     rng: np.random.Generator
+
+    def check_bodies(self, kind: Kind, bodies: int) -> None:
+        """Raise ValueError unless the agent can own so many bodies of a kind."""
 
     def reset(self, scene: Scene, owned: Sequence[int], rng: np.random.Generator) -> None:
         """Begin an episode with the bodies ``scene.bodies[i] for i in owned``.

@@ -54,7 +54,7 @@ class ElectionAgent(ProgrammedAgent):
 
     def vote(self, snapshot: Snapshot, state: BodyState) -> float | None:
         """The distance with which a body stands for election, None when it does not."""
-        if ego_distance(snapshot, state) >= self.distance_m:
+        if ego_distance(snapshot, state) >= self.distance_m or not snapshot.sees_ego:
             return None
         if self.rule == "unsigned":
             return ego_distance(snapshot, state)
@@ -67,17 +67,20 @@ class ElectionAgent(ProgrammedAgent):
 
 
 class Coordinator:
-    """The seed's coordinator c: one election a timestep, none while the winner crosses."""
+    """The seed's coordinator c: one election a timestep, none while the winner crosses.
+
+    With a sensor there is one for each agent, by what it sees: they may not agree.
+    """
 
     def __init__(self, agents: Sequence[ElectionAgent], rng: np.random.Generator) -> None:
         self.agents, self.rng = agents, rng
-        self._step = -1
+        self._seen: Snapshot | None = None
         self._winner: int | None = None
 
     def elected(self, snapshot: Snapshot) -> int | None:
         """The index of the body elected in this timestep, ties drawn; None when nobody is."""
-        if snapshot.step != self._step:
-            self._step = snapshot.step
+        if snapshot is not self._seen:
+            self._seen = snapshot
             self._winner = self._elect(snapshot)
         return self._winner
 

@@ -8,9 +8,11 @@ from __future__ import annotations
 import math
 
 from cavsumo.agents.triggers import MAX_DECEL, REACTION_TIME, time_to_walk
+from cavsumo.agents.walking import walk
+from cavsumo.bodies import Action
 from cavsumo.geometry import stopping_distances
 from cavsumo.scene import Scene
-from cavsumo.snapshot import Snapshot
+from cavsumo.snapshot import BodyState, Snapshot
 
 # Targets of a decision: whether to move, and the heading relative to the way across the road.
 TARGETS: tuple[tuple[bool, float], ...] = (
@@ -20,6 +22,19 @@ TARGETS: tuple[tuple[bool, float], ...] = (
     (True, math.pi),
     (True, -math.pi / 2),
 )
+
+
+def across(scene: Scene, index: int) -> float:
+    """The heading of a body's way across the road, where there is none that of its start [rad]."""
+    way = scene.way(index)
+    return way.heading if way else scene.starts[index].o
+
+
+def towards(state: BodyState, way: float, target: int, dt: float) -> Action:
+    """Throttle and steering towards one of TARGETS, where ``way`` is what ``across`` says."""
+    moving, turn = TARGETS[target]
+    return walk(state, way + turn if moving else state.o, moving * state.body.kind.v_max, dt)
+
 
 FEATURES = (
     "bias",  # 1
@@ -38,8 +53,7 @@ class Features:
 
     def __init__(self, scene: Scene, index: int) -> None:
         self.scene, self.index = scene, index
-        way = scene.way(index)
-        self.across = way.heading if way else scene.starts[index].o
+        self.across = across(scene, index)
         self._seen: tuple[Snapshot, tuple[float, float, float]] | None = None
 
     def values(self, snapshot: Snapshot, target: int) -> list[float]:

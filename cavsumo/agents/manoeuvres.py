@@ -284,8 +284,11 @@ class Arrival:
 
 
 def everybody(snapshot: Snapshot, but: BodyState, *, ego: bool = True) -> Iterator[BodyState]:
-    """All bodies but one, the ego among them if wanted."""
-    yield from (other for other in snapshot.testers if other is not but)
+    """All bodies seen but one, the ego among them if wanted."""
+    unseen = snapshot.unseen
+    for other in snapshot.testers:
+        if other is not but and not (unseen and other.id in unseen):
+            yield other
     yield from map(BodyState._make, snapshot.raw_background)
-    if ego:
+    if ego and snapshot.sees_ego:
         yield snapshot.ego

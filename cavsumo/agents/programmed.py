@@ -97,7 +97,7 @@ class ProgrammedReactiveAgent(ProgrammedAgent):
         self.triggers = [self.trigger(scene, i) for i in owned]
 
     def starts(self, i: int, snapshot: Snapshot, state: BodyState) -> bool:
-        return self.triggers[i](snapshot, state)
+        return self.triggers[i](snapshot, state) and snapshot.sees_ego
 
 
 @AGENTS.register("proximity")

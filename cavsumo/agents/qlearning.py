@@ -20,8 +20,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from cavsumo.agents.base import AGENTS, Agent
-from cavsumo.agents.features import FEATURES, TARGETS, Features
-from cavsumo.agents.walking import walk
+from cavsumo.agents.features import FEATURES, TARGETS, Features, towards
 from cavsumo.bodies import Action
 from cavsumo.checks import number, truth
 from cavsumo.scene import Scene
@@ -90,7 +89,10 @@ class QLearningAgent(Agent):
         if not self._decided:
             self._decided = [self._decide(i, snapshot) for i in range(len(self.owned))]
         return tuple(
-            self._towards(i, target, snapshot) for i, (target, _) in enumerate(self._decided)
+            towards(state, features.across, target, self.scene.dt)
+            for state, features, (target, _) in zip(
+                self.own(snapshot), self.features, self._decided, strict=True
+            )
         )
 
     def process_feedback(
@@ -138,20 +140,13 @@ class QLearningAgent(Agent):
         options = (self.features[i].values(snapshot, target) for target in range(len(TARGETS)))
         return max(self.q_value(f) for f in options)
 
-    def _towards(self, i: int, target: int, snapshot: Snapshot) -> Action:
-        """Throttle and steering towards a target."""
-        state = snapshot.testers[self.owned[i]]
-        moving, turn = TARGETS[target]
-        heading = self.features[i].across + turn if moving else state.o
-        return walk(state, heading, moving * state.body.kind.v_max, self.scene.dt)
-
 
 def load_weights(file: Path) -> list[float]:
     """Weights from a JSON file with a number for each feature; ValueError when it is none."""
     try:
         data = json.loads(file.read_text(encoding="utf-8"))
         if "learned" in data:  # the manifest of a batch
-            data = data["learned"]["q-learning"][0]
+            data = _learner(data["learned"])[0]
         weights = [number(name, data["weights"][name]) for name in FEATURES]
     except OSError as error:
         raise ValueError(f"weights {str(file)!r}: {error.strerror}") from error
@@ -163,3 +158,10 @@ def load_weights(file: Path) -> list[float]:
     if not all(math.isfinite(w) for w in weights):
         raise ValueError(f"weights {str(file)!r}: every weight must be finite")
     return weights
+
+
+def _learner(learned: Mapping[str, Any]) -> Any:
+    """What the learner of a batch knows: that of no label, or the only one."""
+    if "q-learning" not in learned and len(learned) == 1:
+        return next(iter(learned.values()))
+    return learned["q-learning"]

@@ -11,9 +11,9 @@ from cavsumo.errors import Exit, ResultsError
 from cavsumo.outcomes import Outcome
 from cavsumo.recorder import Recorder
 from cavsumo.replays import recorded_plan
-from cavsumo.results import whole_lines
+from cavsumo.results import ego_log_name, whole_lines
 from cavsumo.setting import differences
-from cavsumo.summary import summarise
+from cavsumo.summary import Ended, summarise
 from cavsumo.tally import Tally
 
 SHOWN = 5  # missing episodes that are named
@@ -31,12 +31,12 @@ def merge(parts: Sequence[Path], output: Path, overwrite: bool, quiet: bool) -> 
     with Recorder(output) as recorder:
         recorder.begin(whole, overwrite=overwrite)
         for run, part, row in _in_order(parts):
-            trace = _trace_of(parts[part], row)
-            tally.add(recorder.write(Outcome(row | {"run": run}, trace)))
+            files = _trace_of(parts[part], row), _log_of(parts[part], run)
+            tally.add(recorder.write(Outcome(row | {"run": run}, *files)))
         facts = {"episodes": tally.rows, "counts": tally.all.outcomes}
         recorder.finish("finished", facts)
     if not quiet:
-        summarise(tally, output, recorder.traces)
+        summarise([Ended("", output, tally, recorder.traces)])
     return Exit.OK
 
 
@@ -75,6 +75,7 @@ def _check_whole(parts: Sequence[Path], whole: dict[str, Any]) -> None:
             raise ResultsError(f"{str(parts[part])!r}: run {run} of a batch of {total} episodes")
         missing += range(expected, min(run, expected + SHOWN))
         _trace_of(parts[part], row)
+        _log_of(parts[part], run)
         expected, owner = run + 1, part
     missing += range(expected, min(total, expected + SHOWN))
     if missing:
@@ -108,3 +109,12 @@ def _trace_of(part: Path, row: dict[str, str]) -> str:
         return (part.parent / row["trace"]).read_text(encoding="utf-8")
     except (OSError, UnicodeDecodeError) as error:
         raise ResultsError(f"results {str(part)!r}: trace of run {row['run']}: {error}") from error
+
+
+def _log_of(part: Path, run: int) -> str:
+    """What the ego printed in an episode, empty for nothing."""
+    file = part.parent / ego_log_name(part, run)
+    try:
+        return file.read_text(encoding="utf-8") if file.exists() else ""
+    except (OSError, UnicodeDecodeError) as error:
+        raise ResultsError(f"results {str(part)!r}: {file.name}: {error}") from error

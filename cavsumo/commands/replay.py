@@ -2,49 +2,111 @@
 
 from __future__ import annotations
 
-import dataclasses
 import sys
+from dataclasses import dataclass
 from pathlib import Path
 
-from cavsumo.errors import Exit
-from cavsumo.jobs import job, learners
-from cavsumo.outcomes import Outcome
-from cavsumo.replays import first_difference, recorded_frames, recorded_plan, recorded_row
+from cavsumo.errors import Exit, InputError
+from cavsumo.fcd import write_fcd
+from cavsumo.replays import Record, compare, located, recorded, recorded_alone, replayed
 from cavsumo.setting import Setting, changes, manifest, prepare
-from cavsumo.worker import Worker, search
+from cavsumo.traces import Trace, parsed
+from cavsumo.worker import Worker
+
+TRACE = ".jsonl"  # how the name of a trace ends
 
 
-def replay(results: Path, run_number: int) -> int:
-    """Play a row again; say where it differs, if it does."""
-    plan, recorded = recorded_plan(results)
-    row = recorded_row(results, run_number)
-    frames = recorded_frames(results, row)
-    setting = prepare(plan)
-    for change in changes(recorded, manifest(setting)):
-        print(f"cavsumo: {change}", file=sys.stderr)
-    again = replayed(setting, run_number, shared=row["reset"] == "shared")
-    difference = first_difference(row, frames, again.row, again.frames)
-    if difference is not None:
-        print(f"run {run_number}: diverged: {difference}")
-        return Exit.VIOLATED
-    compared = f"{len(frames)} frames" if frames is not None else "its row (no trace was kept)"
-    print(f"run {run_number} ({row['agent']}): {row['outcome']}, {compared}: the same")
+@dataclass(frozen=True)
+class Wanted:
+    """What a replay is asked for.
+
+    Attributes:
+        run: number of the episode in results; None when a trace is given.
+        net, routes: where the network and the routes are, if not where they were.
+        recorded: take the trace as it is and play nothing.
+        html, fcd: files to write.
+        gui: show it in sumo-gui, with so many milliseconds a timestep.
+    """
+
+    run: int | None = None
+    net: Path | None = None
+    routes: Path | None = None
+    recorded: bool = False
+    html: Path | None = None
+    fcd: Path | None = None
+    gui: bool = False
+    delay: float | None = None
+
+    @property
+    def shown(self) -> bool:
+        """Whether the trace is of any use."""
+        return bool(self.html or self.fcd or self.gui)
+
+
+def replay(file: Path, wanted: Wanted = Wanted()) -> int:
+    """Play an episode again and show it; raises DivergenceError where it first differs."""
+    for option, output in (("--html", wanted.html), ("--fcd", wanted.fcd)):
+        if output is not None and not output.parent.is_dir():
+            raise InputError(f"{option} {str(output)!r}: no such folder {str(output.parent)!r}")
+    if wanted.gui:
+        from cavsumo.gui import check_gui
+
+        check_gui(wanted.delay)
+    record = _record(file, wanted)
+    setting = prepare(record.plan)
+    trace = _recorded_trace(record) if wanted.recorded else _played(setting, record)
+    if wanted.shown and trace is None:
+        raise InputError(f"replay: run {record.run} ended in an error, there is nothing to show")
+    if trace is not None:
+        _show(setting, record, trace, wanted)
     return Exit.OK
 
 
-def replayed(setting: Setting, run_number: int, *, shared: bool = False) -> Outcome:
-    """An episode once more, with all that came before it and matters to it.
+def _record(file: Path, wanted: Wanted) -> Record:
+    """The episode that is meant, with its files."""
+    if file.suffix == TRACE:
+        if wanted.run is not None:
+            raise InputError(f"replay: {str(file)!r} is the trace of one episode; no run is named")
+        return located(recorded_alone(file), wanted.net, wanted.routes)
+    if wanted.run is None:
+        raise InputError(f"replay: which run of {str(file)!r}? name its number")
+    record = recorded(file, wanted.run)
+    if wanted.net or wanted.routes:
+        return located(record, wanted.net, wanted.routes)
+    return record
 
-    Learners first live through their earlier episodes; ``shared``, so does the simulation.
-    """
-    plan, memory = setting.plan, None
-    step = len(plan.agents)
-    learns = job(plan, run_number).agent in learners(plan)
+
+def _recorded_trace(record: Record) -> Trace:
+    """The trace as it was recorded."""
+    if record.trace is None:
+        raise InputError(f"--recorded: no trace was kept of run {record.run}; it must be played")
+    print(f"run {record.run} ({record.row['agent']}): {record.row['outcome']}, as recorded")
+    return record.trace
+
+
+def _played(setting: Setting, record: Record) -> Trace | None:
+    """The trace of the episode played again, the recorded one; None where an error left none."""
+    for change in changes(record.origin, manifest(setting)):
+        print(f"cavsumo: {change}", file=sys.stderr)
     with Worker(setting) as worker:
-        if shared:
-            first = run_number - run_number % plan.block
-            return search(worker, [job(plan, run) for run in range(first, run_number + 1)])[-1][0]
-        for earlier in range(run_number % step, run_number, step) if learns else ():
-            _, memory = worker.play(job(plan, earlier, memory))
-        outcome, _ = worker.play(dataclasses.replace(job(plan, run_number, memory), record=True))
-    return outcome
+        again = replayed(worker, record)
+    compare(record, again)
+    frames = record.trace.frames if record.trace is not None else None
+    compared = f"{len(frames)} frames" if frames is not None else "its row (no trace was kept)"
+    row = record.row
+    print(f"run {record.run} ({row['agent']}): {row['outcome']}, {compared}: the same")
+    return parsed(again.trace) if again.trace else None
+
+
+def _show(setting: Setting, record: Record, trace: Trace, wanted: Wanted) -> None:
+    """Write and show what was asked for."""
+    if wanted.fcd is not None:
+        write_fcd(trace, wanted.fcd)
+    if wanted.html is not None:
+        from cavsumo.player.page import write_page
+
+        write_page(record, trace, setting.site, wanted.html)
+    if wanted.gui:
+        from cavsumo.gui import show
+
+        show(trace, record.plan.scenario, setting.site, wanted.delay)

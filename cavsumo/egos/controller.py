@@ -7,24 +7,17 @@ The class is built with the ego's parameters as keywords. It has ``act(snapshot)
 from __future__ import annotations
 
 import importlib
-import math
 import sys
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
 from cavsumo.bodies import Kind
-from cavsumo.egos.base import EGO_KIND, EGOS, Acceleration, Command, Drive, Ego
+from cavsumo.egos.base import EGO_KIND, Command, Ego
+from cavsumo.egos.effectors import checked, within
 from cavsumo.errors import EgoError, InputError, UnknownName
 from cavsumo.scene import Scene
 from cavsumo.snapshot import Snapshot
-
-
-def make_ego(spec: str, params: Mapping[str, Any]) -> Ego:
-    """The registered ego of that name, or the controller class ``module:Class``."""
-    if ":" not in spec:
-        return EGOS.make(spec, params)
-    return ControllerEgo(spec, _controller_class(spec), params)
 
 
 class ControllerEgo(Ego):
@@ -42,7 +35,7 @@ class ControllerEgo(Ego):
         if not isinstance(self.kind, Kind):
             raise InputError(f"ego {spec}: kind must be a cavsumo.bodies.Kind, got {self.kind!r}")
         speed = getattr(self.controller, "depart_speed", None)
-        if speed is not None and not _within(speed, 0.0, self.kind.v_max):
+        if speed is not None and not within(speed, 0.0, self.kind.v_max):
             raise InputError(f"ego {spec}: depart_speed must lie in [0, {self.kind.v_max:g}] m/s")
         self.depart_speed = speed
         self.sees_background = bool(getattr(self.controller, "sees_background", True))
@@ -61,25 +54,16 @@ class ControllerEgo(Ego):
             command = self.controller.act(snapshot)
         except Exception as error:
             raise EgoError(f"{at}: act raised {_said(error)}") from error
-        return self._checked(command, at)
-
-    def _checked(self, command: Any, at: str) -> Command:
-        """The command, if it is one that the ego's effectors can execute."""
-        if not isinstance(command, (Acceleration, Drive)):
-            raise EgoError(f"{at}: answered {command!r}, expected Acceleration or Drive")
-        if self._sort not in (None, type(command)):
-            raise EgoError(f"{at}: changed from {self._sort.__name__} to {command!r}")
+        try:
+            checked(command, self._sort, self.kind)
+        except EgoError as error:
+            raise EgoError(f"{at}: {error}") from error
         self._sort = type(command)
-        kind = self.kind
-        limits = [(kind.throttle_min, kind.throttle_max), (-kind.steering_max, kind.steering_max)]
-        for name, value, (low, high) in zip(command._fields, command, limits, strict=False):
-            if not _within(value, low, high):
-                raise EgoError(f"{at}: {name} must lie in [{low:g}, {high:g}], got {value!r}")
-        return command
+        return command  # type: ignore[no-any-return]
 
 
-def _controller_class(spec: str) -> Callable[..., Any]:
-    """Import ``module:Class``, the working directory included."""
+def controller_class(spec: str) -> Callable[..., Any]:
+    """Import ``module:Class``, the working folder included."""
     module_name, _, class_name = spec.partition(":")
     here = str(Path.cwd())
     if here not in sys.path:
@@ -95,14 +79,6 @@ def _controller_class(spec: str) -> Callable[..., Any]:
         raise UnknownName(f"class in module {module_name}", class_name, names, f"ego {spec}")
     factory: Callable[..., Any] = getattr(module, class_name)
     return factory
-
-
-def _within(value: Any, low: float, high: float) -> bool:
-    """Whether a value is a finite number between two bounds, rounding forgiven."""
-    try:
-        return math.isfinite(value) and low - 1e-9 <= value <= high + 1e-9
-    except TypeError:
-        return False
 
 
 def _said(error: BaseException) -> str:

@@ -1,0 +1,104 @@
+"""Testers that a user trained: ``policy:FILE``, the format is that of ``policies``.
+
+Such a tester goes wherever the name of a registered one does.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from cavsumo.agents.base import AGENTS, Agent
+from cavsumo.agents.features import across, towards
+from cavsumo.bodies import WALKING, Action, Kind
+from cavsumo.errors import InputError, UnknownName
+from cavsumo.observations import Observer
+from cavsumo.policies import Policy, read_policy
+from cavsumo.registry import Parameter
+from cavsumo.scene import Scene
+from cavsumo.snapshot import Snapshot
+
+PREFIX = "policy:"
+
+
+def make_agent(spec: str, params: Mapping[str, Any]) -> Agent:
+    """The registered agent of that name, or the policy in ``policy:FILE``."""
+    file = policy_file(spec)
+    if file is None:
+        return AGENTS.make(spec, params)
+    for key in params:
+        raise UnknownName("parameter", key, (), f"agent {spec}")
+    return PolicyAgent(read_policy(file))
+
+
+def parameters_of(spec: str) -> list[Parameter]:
+    """The parameters of an agent; a policy has none, all that it is is in its file."""
+    return AGENTS.parameters(spec) if policy_file(spec) is None else []
+
+
+def policy_file(spec: str) -> Path | None:
+    """The file of ``policy:FILE``, None for any other name."""
+    if not spec.startswith(PREFIX):
+        return None
+    if spec == PREFIX:
+        raise InputError(f"agent {spec!r}: expected the file of a policy, {PREFIX}FILE")
+    return Path(spec.removeprefix(PREFIX))
+
+
+class PolicyAgent(Agent):
+    """A trained policy; it does the same in the same situation, and learns nothing."""
+
+    sees_background = False
+
+    def __init__(self, policy: Policy) -> None:
+        self.policy = policy
+        self.drives = policy.header.kind not in WALKING
+
+    def check_bodies(self, kind: Kind, bodies: int) -> None:
+        header = self.policy.header
+        if (header.kind, header.bodies) != (kind.name, bodies):
+            raise ValueError(
+                f"trained for {header.bodies} {header.kind} a team, this has {bodies} {kind.name} "
+                f"(--kind, --bodies-per-agent)"
+            )
+
+    def reset(self, scene: Scene, owned: Sequence[int], rng: np.random.Generator) -> None:
+        super().reset(scene, owned, rng)
+        self._observer = Observer(scene, owned)
+        self._ways = [across(scene, i) for i in owned]
+        self._left = 0  # timesteps that the decision still holds
+
+    def choose_action(self, snapshot: Snapshot) -> tuple[Action, ...]:
+        if self._left == 0:
+            self._left = self.policy.header.hold
+            self._decide(snapshot)
+        self._left -= 1
+        if self.policy.header.actions == "targets":
+            return tuple(
+                towards(state, way, target, self.scene.dt)
+                for state, way, target in zip(
+                    self.own(snapshot), self._ways, self._targets, strict=True
+                )
+            )
+        return self._actions
+
+    def _decide(self, snapshot: Snapshot) -> None:
+        """Ask the policy."""
+        observation = self._observer.vector(snapshot)
+        if self.policy.header.actions == "targets":
+            self._targets = self.policy.targets(observation)
+            return
+        efforts = self.policy.efforts(observation)
+        self._actions = tuple(
+            effort(state.body.kind, *pair)
+            for state, pair in zip(self.own(snapshot), efforts, strict=True)
+        )
+
+
+def effort(kind: Kind, throttle: float, steering: float) -> Action:
+    """The action at shares of the effectors' ranges: -1 is the lower limit, 1 the upper one."""
+    low, high = kind.throttle_min, kind.throttle_max
+    return Action(low + (throttle + 1.0) / 2.0 * (high - low), steering * kind.steering_max)

@@ -1,0 +1,52 @@
+"""From the words that name an ego to the ego, and to the files that it is made of."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Mapping
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+from cavsumo.egos.base import EGOS, Ego
+from cavsumo.egos.controller import ControllerEgo, controller_class
+from cavsumo.egos.external import EXTERNAL, command_words
+from cavsumo.registry import Registry
+
+# What an ego may be called besides a registered name, for listings.
+FORMS: Mapping[str, str] = {
+    "module:Class": "a Python class that answers each snapshot (README, docs/architecture.md)",
+    "exec:COMMAND": "a program in any language, over its stdin and stdout (docs/ego-protocol.md)",
+    "tcp:HOST:PORT": "a program that listens there, by the same protocol",
+}
+
+
+def make_ego(spec: str, params: Mapping[str, Any]) -> Ego:
+    """The registered ego of that name, one from outside, or the controller ``module:Class``."""
+    sort, colon, _ = spec.partition(":")
+    if not colon:
+        return EGOS.make(spec, params)
+    if sort in EXTERNAL:
+        alone: Registry[Ego] = Registry("ego")  # so that the messages name all of it
+        alone.register(spec)(partial(EXTERNAL.get(sort), spec))
+        return alone.make(spec, params)
+    return ControllerEgo(spec, controller_class(spec), params)
+
+
+def ego_files(spec: str) -> tuple[Path, ...]:
+    """The files that make an ego what it is: those that a command names, or the class's module."""
+    sort, colon, address = spec.partition(":")
+    if not colon or sort == "tcp":
+        return ()
+    if sort == "exec":
+        words = dict.fromkeys(command_words(address))
+        return tuple(file for file in map(Path, words) if file.is_file())
+    controller_class(spec)
+    source = getattr(sys.modules[sort], "__file__", None)
+    return (_relative(Path(source)),) if source else ()
+
+
+def _relative(file: Path) -> Path:
+    """A file relative to the working folder, if it lies there."""
+    here = Path.cwd()
+    return file.relative_to(here) if file.is_relative_to(here) else file

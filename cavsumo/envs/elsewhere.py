@@ -1,0 +1,119 @@
+"""Episodes in a process of their own, seen from outside: a pipe, a deadline, a fresh one after it.
+
+A process has one simulation, so whoever wants several side by side in one program, or wants to
+outlive a crash of SUMO, plays them here. It costs one message there and back each step.
+"""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+import weakref
+from collections.abc import Mapping, Sequence
+from multiprocessing import Pipe
+from multiprocessing.connection import Connection
+from typing import Any
+
+from cavsumo.envs.episodes import Seen
+from cavsumo.envs.settings import Roles
+from cavsumo.errors import CavsumoError, SimulationError
+from cavsumo.processes import inner_environment
+from cavsumo.setting import Setting
+from cavsumo.snapshot import Snapshot
+
+
+class Elsewhere:
+    """What ``Episodes`` is, in a child process that ``reset`` starts when there is none."""
+
+    def __init__(self, setting: Setting, roles: Roles) -> None:
+        self._setting, self._roles = setting, roles
+        self._child: _Child | None = None
+
+    def reset(self, seed: int) -> Seen:
+        """As ``Episodes.reset``."""
+        if self._child is None:
+            self._child = _Child(self._setting, self._roles)
+        seen: Seen = self._ask("reset", seed)
+        return seen
+
+    def step(self, actions: Mapping[str, Sequence[float]]) -> Seen:
+        """As ``Episodes.step``."""
+        seen: Seen = self._ask("step", dict(actions))
+        return seen
+
+    def snapshot(self) -> Snapshot:
+        """As ``Episodes.snapshot``."""
+        snapshot: Snapshot = self._ask("snapshot")
+        return snapshot
+
+    def close(self) -> None:
+        """End the process."""
+        if self._child is not None:
+            self._child.end()
+            self._child = None
+
+    def _ask(self, method: str, *arguments: Any) -> Any:
+        """The answer to a call, or the error that it raised there."""
+        if self._child is None:
+            raise SimulationError("no episode is under way; reset first")
+        try:
+            answer = self._child.call(method, *arguments)
+        except _Gone as gone:
+            self.close()
+            raise SimulationError(f"{gone}; reset starts another one") from None
+        except BaseException:  # interrupted: the answer must not be taken for the next one's
+            self.close()
+            raise
+        if isinstance(answer, CavsumoError):
+            raise answer
+        return answer
+
+
+class _Gone(Exception):
+    """The process died or was too slow; the message says how."""
+
+
+class _Child:
+    """One process; ended at the latest with the object."""
+
+    def __init__(self, setting: Setting, roles: Roles) -> None:
+        self._pipe, theirs = Pipe()
+        self._deadline = setting.plan.deadline_s
+        numbers = str(theirs.fileno()), str(os.getpid())
+        try:
+            self._process = subprocess.Popen(
+                [sys.executable, "-P", "-m", "cavsumo.envs.elsewhere_process", *numbers],
+                pass_fds=(theirs.fileno(),),
+                cwd=setting.folder,
+                env=inner_environment(),
+                stdin=subprocess.DEVNULL,
+                process_group=0,
+            )
+        except OSError as error:
+            raise SimulationError(f"cannot start a process to simulate in: {error}") from error
+        finally:
+            theirs.close()
+        self.end = weakref.finalize(self, _end, self._process, self._pipe, os.getpid())
+        self._pipe.send((setting, roles))
+
+    def call(self, method: str, *arguments: Any) -> Any:
+        """Send a call and wait for what it returned or raised."""
+        try:
+            self._pipe.send((method, arguments))
+            if self._pipe.poll(self._deadline):
+                return self._pipe.recv()
+        except (EOFError, OSError):
+            code = self._process.wait(5.0)
+            ended = f"died of signal {-code}" if code < 0 else f"ended with status {code}"
+            raise _Gone(f"the simulation process {ended}") from None
+        raise _Gone(f"the simulation process did not answer within {self._deadline:g} s, killed")
+
+
+def _end(process: subprocess.Popen[bytes], pipe: Connection, owner: int) -> None:
+    """Kill a process, which holds nothing that is missed, and reap it; not from a fork."""
+    pipe.close()
+    if os.getpid() != owner:
+        return
+    process.kill()
+    process.wait(10.0)

@@ -1,0 +1,207 @@
+"""A snapshot as a picture from above, with Pillow: roads, the ego's path and zones, everybody.
+
+The picture follows the ego. It is drawn twice as large and then reduced, for smooth edges.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Iterator, Sequence
+from typing import Any
+
+import numpy as np
+import shapely
+from numpy.typing import NDArray
+
+from cavsumo.agents.triggers import MAX_DECEL, REACTION_TIME
+from cavsumo.bodies import WALKING
+from cavsumo.errors import InputError
+from cavsumo.geometry import Box, corners, zone_polygons
+from cavsumo.setting import Setting
+from cavsumo.snapshot import BodyState, Snapshot
+
+try:
+    from PIL import Image, ImageDraw, ImageFont
+except ModuleNotFoundError as error:
+    raise InputError("render_mode rgb_array needs Pillow: pip install 'cavsumo[render]'") from error
+
+WIDTH, HEIGHT = 720, 540  # px
+SCALE = 11.0  # px/m
+FINER = 2  # drawn so many times larger
+AHEAD_M = 16.0  # the middle of the picture is so far ahead of the ego
+DASH_M = 2.0  # of the ego's path
+HEAD_M = 0.3  # radius of who walks, seen from above
+
+GROUND, ROAD, PAVEMENT, MARKING = "#e9ece2", "#8b9096", "#d3ccbb", "#f4f4f0"
+CROSSING, AXIS = "#b9bcbd", "#9a9fa4"
+PATH, EGO, TESTER, CAR, PERSON = "#1b7837", "#1f5fa8", "#d6402b", "#f0f0ec", "#6a51a3"
+BRAKING, REACTION = (214, 64, 43, 150), (245, 179, 1, 150)
+LIGHTS = {"r": "#d7191c", "u": "#d7191c", "y": "#f5b301", "g": "#1a9641"}
+TEXT, OUTLINE = "#222222", "#303030"
+
+Points = Sequence[tuple[float, float]]
+
+
+class Painter:
+    """Paints the snapshots of a setting."""
+
+    def __init__(self, setting: Setting) -> None:
+        site = setting.site
+        self._path, self._lights = site.route.path, site.lights
+        self._carriageway, self._lanes = site.roads.carriageway, site.roads.lanes
+        self._pavements = shapely.union_all(
+            [
+                shapely.LineString(area.pavement.points).buffer(area.width / 2, cap_style="flat")
+                for area in site.areas
+            ]
+        )
+        self._crossings = site.crossings
+        self._font = ImageFont.load_default(15 * FINER)
+        params = setting.plan.scenario.assertion_params
+        self._decel = float(params.get("max_decel", MAX_DECEL))
+        self._reaction = float(params.get("reaction_time", REACTION_TIME))
+
+    def paint(self, snapshot: Snapshot) -> NDArray[np.uint8]:
+        """The picture, uint8 of shape (HEIGHT, WIDTH, 3)."""
+        canvas = _Canvas(_middle(snapshot.ego))
+        self._ground(canvas)
+        self._way(canvas, snapshot)
+        self._zones(canvas, snapshot)
+        for body in snapshot.background:
+            _draw(canvas, body, PERSON if body.body.kind.name in WALKING else CAR)
+        for body in snapshot.testers:
+            _draw(canvas, body, TESTER)
+        _draw(canvas, snapshot.ego, EGO)
+        self._words(canvas, snapshot)
+        return canvas.pixels()
+
+    def _ground(self, canvas: _Canvas) -> None:
+        """Pavements, carriageways, crossings and the middles of lanes."""
+        canvas.areas(self._pavements, PAVEMENT)
+        canvas.areas(self._carriageway, ROAD)
+        for lane in self._lanes:
+            canvas.lines(lane, AXIS, 0.12)
+        canvas.areas(self._crossings, CROSSING)
+
+    def _way(self, canvas: _Canvas, snapshot: Snapshot) -> None:
+        """The ego's path in dashes, and the traffic lights on it."""
+        path = self._path
+        for i in range(0, int(path.length / DASH_M), 2):
+            begin, end = i * DASH_M, min((i + 1) * DASH_M, path.length)
+            if canvas.shows(*path.at(begin)[:2]):
+                canvas.line([path.at(begin)[:2], path.at(end)[:2]], PATH, 0.2)
+        for light, letter in zip(self._lights, snapshot.lights, strict=False):
+            x, y, o = path.at(light.along)
+            dx, dy = -1.6 * math.sin(o), 1.6 * math.cos(o)
+            colour = LIGHTS.get(letter.lower(), MARKING)
+            canvas.line([(x - dx, y - dy), (x + dx, y + dy)], colour, 0.5)
+
+    def _zones(self, canvas: _Canvas, snapshot: Snapshot) -> None:
+        """The braking and the reaction zone of the reaction-zone assertion."""
+        ego = snapshot.ego
+        zones = zone_polygons(
+            ego.box,
+            ego.v,
+            max_decel=self._decel,
+            reaction_time=self._reaction,
+            wheelbase=ego.body.kind.wheelbase,
+            steering=snapshot.ego_steering,
+        )
+        for outline, colour in ((zones.braking, BRAKING), (zones.reaction, REACTION)):
+            canvas.tint(outline, colour)
+
+    def _words(self, canvas: _Canvas, snapshot: Snapshot) -> None:
+        """Time and speed."""
+        canvas.text(f"{snapshot.time:.1f} s   ego {snapshot.ego.v:.1f} m/s", self._font)
+
+
+class _Canvas:
+    """An image in metres around a point, x to the right and y up."""
+
+    def __init__(self, middle: tuple[float, float]) -> None:
+        self._scale = SCALE * FINER
+        half_w, half_h = WIDTH / SCALE / 2, HEIGHT / SCALE / 2
+        self._west, self._north = middle[0] - half_w, middle[1] + half_h
+        self._window = (self._west, middle[1] - half_h, middle[0] + half_w, self._north)
+        self._image = Image.new("RGB", (WIDTH * FINER, HEIGHT * FINER), GROUND)
+        self._pen = ImageDraw.Draw(self._image, "RGBA")
+
+    def shows(self, x: float, y: float) -> bool:
+        """Whether a point lies in the picture."""
+        west, south, east, north = self._window
+        return west <= x <= east and south <= y <= north
+
+    def areas(self, geometry: shapely.Geometry, colour: str) -> None:
+        """Fill polygons; their holes show the ground."""
+        for part in _parts(shapely.clip_by_rect(geometry, *self._window), "Polygon"):
+            self._pen.polygon(self._pixels(part.exterior.coords), fill=colour)
+            for hole in part.interiors:
+                self._pen.polygon(self._pixels(hole.coords), fill=GROUND)
+
+    def lines(self, geometry: shapely.Geometry, colour: str, width: float) -> None:
+        """Draw polylines of a width [m]."""
+        for part in _parts(shapely.clip_by_rect(geometry, *self._window), "LineString"):
+            self.line(part.coords, colour, width)
+
+    def line(self, points: Iterable[Sequence[float]], colour: str, width: float) -> None:
+        """Draw one polyline of a width [m]."""
+        self._pen.line(self._pixels(points), fill=colour, width=max(1, round(width * self._scale)))
+
+    def tint(self, points: Points, colour: tuple[int, int, int, int]) -> None:
+        """Fill one polygon with a colour that lets what is below through."""
+        if len(points) > 2:
+            self._pen.polygon(self._pixels(points), fill=colour)
+
+    def body(self, points: Points, colour: str) -> None:
+        """Fill one polygon with an outline."""
+        self._pen.polygon(self._pixels(points), fill=colour, outline=OUTLINE, width=FINER)
+
+    def dot(self, x: float, y: float, radius: float, colour: str) -> None:
+        """Fill a circle with an outline."""
+        ((px, py),) = self._pixels([(x, y)])
+        self._pen.circle((px, py), radius * self._scale, colour, OUTLINE, FINER)
+
+    def text(self, words: str, font: Any) -> None:
+        """Write into the upper left corner."""
+        left, top, right, bottom = self._pen.textbbox((24, 20), words, font=font)
+        self._pen.rounded_rectangle(
+            (left - 12, top - 9, right + 12, bottom + 9), 8, fill=(255, 255, 255, 215)
+        )
+        self._pen.text((24, 20), words, fill=TEXT, font=font)
+
+    def pixels(self) -> NDArray[np.uint8]:
+        """The finished picture."""
+        return np.array(self._image.reduce(FINER), dtype=np.uint8)
+
+    def _pixels(self, points: Iterable[Sequence[float]]) -> list[tuple[float, float]]:
+        scale, west, north = self._scale, self._west, self._north
+        return [((p[0] - west) * scale, (north - p[1]) * scale) for p in points]
+
+
+def _middle(ego: BodyState) -> tuple[float, float]:
+    """The middle of the picture: ahead of the ego."""
+    return ego.x + AHEAD_M * math.cos(ego.o), ego.y + AHEAD_M * math.sin(ego.o)
+
+
+def _draw(canvas: _Canvas, state: BodyState, colour: str) -> None:
+    """A body's box, for vehicles with a windscreen; who walks has a nose."""
+    canvas.body(corners(state.box), colour)
+    kind, ahead = state.body.kind, (math.cos(state.o), math.sin(state.o))
+    if kind.name in WALKING:
+        tip = (state.x + 0.8 * ahead[0], state.y + 0.8 * ahead[1])
+        canvas.line([(state.x, state.y), tip], OUTLINE, 0.12)
+        canvas.dot(state.x, state.y, HEAD_M, colour)
+    else:
+        along = kind.length * 0.18
+        glass = (state.x + along * ahead[0], state.y + along * ahead[1])
+        pane = Box(*glass, state.o, kind.length * 0.14, kind.width * 0.8)
+        canvas.tint(corners(pane), (30, 40, 55, 200))
+
+
+def _parts(geometry: shapely.Geometry, sort: str) -> Iterator[Any]:
+    """The parts of a geometry that are polygons, or lines."""
+    for part in getattr(geometry, "geoms", [geometry]):
+        if hasattr(part, "geoms"):
+            yield from _parts(part, sort)
+        elif part.geom_type == sort and not part.is_empty:
+            yield part

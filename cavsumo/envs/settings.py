@@ -1,0 +1,117 @@
+"""From the keywords of an environment to a scenario that was checked, with its site."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from cavsumo.bodies import WALKING
+from cavsumo.checks import choice, whole
+from cavsumo.config import read_config
+from cavsumo.egos import make_ego
+from cavsumo.egos.base import Ego
+from cavsumo.envs.puppets import ACTIONS, PuppetEgo
+from cavsumo.errors import InputError, UnknownName
+from cavsumo.jobs import learners
+from cavsumo.scenario import SCENARIO_KEYS, plan_from
+from cavsumo.setting import Setting, prepare
+
+UNTIL = ("game", "verdict")
+PROCESSES = ("this", "own")
+KEYS = SCENARIO_KEYS | {"seed", "params"}  # of a scenario file, what matters to an environment
+
+
+@dataclass(frozen=True)
+class Roles:
+    """Who is moved from outside, and how.
+
+    Attributes:
+        agent: the registered agent that plays the testers; None when they are moved from outside.
+        ego: keywords of the ``PuppetEgo``; None when the scenario's ego drives.
+        until: "game": an episode ends when the tester's game does, at its goal or in a dead end;
+            "verdict": when the assertions have decided, as in ``cavsumo run``.
+        hold: for how many timesteps an action lasts.
+        actions: what an action of the testers is: "effectors" or "targets".
+        drawn: whether pictures are made, for which the whole background is read.
+    """
+
+    agent: str | None = None
+    ego: Mapping[str, Any] | None = None
+    until: str = "game"
+    hold: int = 1
+    actions: str = "effectors"
+    drawn: bool = False
+    named: str = field(default="cavsumo", compare=False)  # the environment, for what it refuses
+
+    def __post_init__(self) -> None:
+        try:
+            choice("until", self.until, UNTIL)
+            whole("hold", self.hold, 1)
+            choice("actions", self.actions, ACTIONS)
+        except ValueError as error:
+            raise InputError(f"{self.named}: {error}") from error
+
+    def make_ego(self, setting: Setting) -> Ego:
+        """The ego that drives."""
+        if self.ego is not None:
+            return PuppetEgo(**self.ego)
+        scenario = setting.plan.scenario
+        return make_ego(scenario.ego, scenario.ego_params)
+
+
+def setting_for(
+    roles: Roles, config: str | Path | None, given: Mapping[str, Any], *, one_team: bool
+) -> Setting:
+    """The setting of an environment; raises InputError in one sentence.
+
+    Args:
+        config: a scenario file, whose batch settings are left aside.
+        given: settings by the names of a scenario file; they win over the file's.
+        one_team: one agent owns all testers.
+    """
+    source = roles.named
+    for key in given:
+        if key not in KEYS:
+            raise UnknownName("keyword", key, KEYS | {"config", "hold", "until"}, source)
+    file = read_config(Path(config)) if config is not None else {}
+    settings = {k: v for k, v in (file | dict(given)).items() if k in KEYS}
+    if settings.get("net") is None:
+        raise InputError(f"{source}: no network given; name one with net=FILE")
+    settings = {k: v for k, v in settings.items() if v is not None}
+    _refuse_what_is_learned(roles, given, settings)
+    if one_team:
+        _own_all(settings, source)
+    plan = plan_from(settings | {"agents": (roles.agent or "noop",)}, source)
+    if roles.actions == "targets" and plan.scenario.kind not in WALKING:
+        raise InputError(f"{source}: actions 'targets' are for {' and '.join(WALKING)}s only")
+    if learners(plan):
+        raise InputError(
+            f"{source}: agent {roles.agent} learns from episode to episode, so a seed would not "
+            "make an episode; params={'learn': False} plays what was learned"
+        )
+    return prepare(plan, PuppetEgo(**roles.ego) if roles.ego is not None else None)
+
+
+def _refuse_what_is_learned(
+    roles: Roles, given: Mapping[str, Any], settings: dict[str, Any]
+) -> None:
+    """Refuse settings of whom the learner replaces; a scenario file may have them."""
+    replaced = ["ego", "ego_params"] if roles.ego is not None else []
+    replaced += ["params"] if roles.agent is None else []
+    for key in replaced:
+        if given.get(key):
+            who = "ego is" if key.startswith("ego") else "testers are"
+            raise InputError(f"{roles.named}: {key}: the {who} moved by whoever steps this")
+        settings.pop(key, None)
+
+
+def _own_all(settings: dict[str, Any], source: str) -> None:
+    """One agent for all testers, unless that is not what was asked for."""
+    testers = settings.get("testers", 3)
+    if settings.setdefault("bodies_per_agent", testers) != testers:
+        raise InputError(
+            f"{source}: bodies_per_agent {settings['bodies_per_agent']}: here one learner owns all "
+            f"{testers} testers; cavsumo.envs.parallel_env has an agent for each team"
+        )

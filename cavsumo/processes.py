@@ -1,0 +1,54 @@
+"""What every process needs that we start: an end with its parent, and words for how it ended."""
+
+from __future__ import annotations
+
+import os
+import signal
+import sys
+from collections.abc import Callable
+
+PR_SET_PDEATHSIG = 1  # Linux, prctl(2)
+OUTER_PATH = "CAVSUMO_OUTER_PYTHONPATH"  # what PYTHONPATH was before it was set for our own
+
+
+def leash(parent: int) -> Callable[[], None]:
+    """What a new process calls so that Linux kills it when its parent dies.
+
+    It is made before the process is, so that nothing has to be loaded between fork and exec.
+    """
+    bind: Callable[[], object] = int
+    if sys.platform == "linux":
+        import ctypes
+
+        prctl = ctypes.CDLL(None).prctl
+        bind = lambda: prctl(PR_SET_PDEATHSIG, signal.SIGKILL)  # noqa: E731
+
+    def put_on() -> None:
+        bind()
+        if os.getppid() != parent:  # it has died already
+            os._exit(1)
+
+    return put_on
+
+
+def ending(code: int) -> str:
+    """How a process ended, from its exit status or the number of the signal, negative."""
+    if code < 0:
+        names = {s.value: s.name for s in signal.Signals}
+        return f"died of {names.get(-code, f'signal {-code}')}"
+    return f"ended with status {code}"
+
+
+def inner_environment() -> dict[str, str]:
+    """The environment of a process of ours, which finds the modules that this one finds."""
+    outer = os.environ.get("PYTHONPATH", "")
+    return {**os.environ, "PYTHONPATH": os.pathsep.join(sys.path), OUTER_PATH: outer}
+
+
+def outer_environment() -> dict[str, str]:
+    """The environment without what was added to find our own modules in a process of ours."""
+    environment = dict(os.environ)
+    outer = environment.pop(OUTER_PATH, None)
+    if outer is not None:
+        environment.pop("PYTHONPATH", None)
+    return environment | ({"PYTHONPATH": outer} if outer else {})

@@ -1,0 +1,61 @@
+"""Everything that a report says, in one record; nothing here knows how it is shown."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from cavsumo.report.compare import Comparison, comparisons
+from cavsumo.report.distinct import Distinct, FailureCell, distinct, failure_cells
+from cavsumo.report.effort import Effort, effort
+from cavsumo.report.events import Described, described
+from cavsumo.report.grouping import Group, grouped
+from cavsumo.report.load import Evidence, load
+from cavsumo.report.rates import Rates, rates
+from cavsumo.report.survival import TimeToTest, times_to_test
+
+
+@dataclass(frozen=True)
+class Report:
+    """The evidence of some results.
+
+    Attributes:
+        by: the column that rows are grouped by besides their agents; "agent" for none.
+        evidence: the rows and where they come from.
+        groups: the rows told together.
+        rates, times, efforts, distinct: one entry a group, in the same order.
+        comparisons: groups in pairs, on the same seeds.
+        tests: what the traces tell of each test, by the index of its row.
+        failures: failures that are alike, the most frequent first.
+    """
+
+    by: str
+    evidence: Evidence
+    groups: Sequence[Group]
+    rates: Sequence[Rates]
+    comparisons: Sequence[Comparison]
+    times: Sequence[TimeToTest]
+    efforts: Sequence[Effort]
+    distinct: Sequence[Distinct]
+    tests: Mapping[int, Described]
+    failures: Sequence[FailureCell]
+
+
+def analyse(files: Sequence[Path], by: str = "agent") -> Report:
+    """Read results and compute all that a report says; raises InputError for what is wrong."""
+    evidence = load(files, by)
+    groups = grouped(evidence, by)
+    tests = described(evidence)
+    return Report(
+        by,
+        evidence,
+        groups,
+        [rates(group) for group in groups],
+        comparisons(groups, by),
+        times_to_test(groups),
+        [effort(group) for group in groups],
+        [distinct(group, tests, evidence.batches) for group in groups],
+        tests,
+        failure_cells(groups, tests, evidence.batches),
+    )

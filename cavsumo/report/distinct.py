@@ -1,0 +1,149 @@
+"""How many of the tests and failures differ: cells of speed, side, place and kind of tester.
+
+Two tests are alike when they lie in the same cell. How many cells were not met yet is estimated
+from those met once (Good and Turing: Good 1953, Biometrika 40, 237) or once and twice (Chao 1984,
+Scand. J. Stat. 11, 265).
+"""
+
+from __future__ import annotations
+
+import math
+from collections import Counter
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from typing import NamedTuple
+
+from cavsumo.report.events import Described, Event
+from cavsumo.report.grouping import Group, Told
+from cavsumo.report.load import Batch
+
+SPEED_BIN, PLACE_BIN = 2.0, 10.0  # m/s, m
+
+
+class Cell(NamedTuple):
+    """What makes two tests alike.
+
+    Attributes:
+        setting: where they were played, if there are several settings.
+        kind: kind of tester.
+        side: of the ego.
+        speed, place: lower bounds of the closing speed [m/s] and of the ego's way so far [m].
+    """
+
+    setting: str
+    kind: str
+    side: str
+    speed: float
+    place: float
+
+
+@dataclass(frozen=True)
+class Diversity:
+    """How many cells there are.
+
+    Attributes:
+        total: how many tests, or failures.
+        known: of how many the cell is known.
+        cells: how many cells they lie in.
+        estimate: Chao's lower bound for how many there are, met or not; None when none is known.
+        new: Good and Turing's share of the next ones that would lie in a new cell; None likewise.
+    """
+
+    total: int
+    known: int
+    cells: int
+    estimate: float | None
+    new: float | None
+
+
+@dataclass(frozen=True)
+class Distinct(Told):
+    """How different the tests and the failures of a group are.
+
+    Attributes:
+        tests: at their triggers.
+        failures: at their impacts.
+    """
+
+    tests: Diversity
+    failures: Diversity
+
+
+@dataclass(frozen=True)
+class FailureCell:
+    """Failures that are alike, of all agents together.
+
+    Attributes:
+        cell: what they have in common.
+        count: how many there are.
+        file, run: the first of them.
+        agents: who found them.
+    """
+
+    cell: Cell
+    count: int
+    file: str
+    run: int
+    agents: tuple[str, ...]
+
+
+def cell_of(event: Event, kind: str, setting: str) -> Cell | None:
+    """The cell of an event, None when anything of it is not known."""
+    if event.speed is None or event.side is None or event.place is None:
+        return None
+    speed, place = _floor(event.speed, SPEED_BIN), _floor(event.place, PLACE_BIN)
+    return Cell(setting, kind, event.side, speed, place)
+
+
+def _floor(value: float, width: float) -> float:
+    """The lower bound of the bin that a value lies in."""
+    return math.floor(value / width + 1e-9) * width
+
+
+def distinct(group: Group, tests: Mapping[int, Described], batches: tuple[Batch, ...]) -> Distinct:
+    """How different the tests and failures of a group are."""
+    found = [
+        (tests[int(index)], batches[batch].plan.scenario.kind)
+        for index, batch in group.rows["batch"].items()
+        if int(index) in tests
+    ]
+    triggers = [cell_of(test.trigger, kind, "") for test, kind in found]
+    impacts = [cell_of(test.impact, kind, "") for test, kind in found if test.impact is not None]
+    return Distinct(*group.whose, tests=diversity(triggers), failures=diversity(impacts))
+
+
+def diversity(cells: Iterable[Cell | None]) -> Diversity:
+    """How many cells there are, and how many there may be.
+
+    Chao's bound with the correction of its bias: S + f1 (f1 - 1) / (2 (f2 + 1)), where f1 and f2
+    are how many cells were met once and twice.
+    """
+    cells = list(cells)
+    counts = Counter(cell for cell in cells if cell is not None)
+    known, often = counts.total(), Counter(counts.values())
+    if not known:
+        return Diversity(len(cells), 0, 0, None, None)
+    estimate = len(counts) + often[1] * (often[1] - 1) / (2 * (often[2] + 1))
+    return Diversity(len(cells), known, len(counts), estimate, often[1] / known)
+
+
+def failure_cells(
+    groups: Iterable[Group], tests: Mapping[int, Described], batches: tuple[Batch, ...]
+) -> list[FailureCell]:
+    """The cells of all failures, the most frequent first."""
+    members: dict[Cell, list[tuple[str, int, str]]] = {}
+    for group in groups:
+        rows = group.rows[group.rows["outcome"] == "violated"]
+        for row in rows[["batch", "file", "run", "agent"]].itertuples():
+            impact = tests[int(row.Index)].impact
+            kind = batches[row.batch].plan.scenario.kind
+            cell = cell_of(impact, kind, group.setting) if impact is not None else None
+            if cell is not None:
+                members.setdefault(cell, []).append((row.file, int(row.run), row.agent))
+    found = [
+        FailureCell(
+            cell, len(rows), *min(rows)[:2], agents=tuple(dict.fromkeys(a for *_, a in rows))
+        )
+        for cell, rows in members.items()
+    ]
+    return sorted(found, key=lambda f: (-f.count, f.file, f.run))

@@ -1,0 +1,112 @@
+"""What a trace tells of a test: how fast, from which side and where along the ego's way.
+
+A test is described at its trigger, a failure also at its impact. Where no trace was kept, only the
+closing speed of an impact is known, from the row.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import pandas
+
+from cavsumo.egos.base import EGO_KIND
+from cavsumo.report.load import Evidence
+from cavsumo.traces import read_moments
+
+Pose = Sequence[float]  # x, y [m], v [m/s], o [rad]
+Moment = tuple[float, dict[str, Any]]  # how far the ego has driven [m], the frame
+FRONT, LEFT, RIGHT, REAR = "front", "left", "right", "rear"
+
+USED = ["batch", "outcome", "tester", "trace", "trigger_time_s", "violation_time_s"]
+USED += ["impact_speed_mps"]
+
+
+class Event(NamedTuple):
+    """A moment of a test; None for what is not known.
+
+    Attributes:
+        speed: closing speed, along the ego's heading [m/s].
+        side: of the ego, where the tester's centre is: at the trigger left or right of the strip
+            ahead or in its front; at an impact the side of the ego that was hit.
+        place: how far the ego had driven since it entered [m].
+        x, y: where the tester's centre was [m].
+    """
+
+    speed: float | None = None
+    side: str | None = None
+    place: float | None = None
+    x: float | None = None
+    y: float | None = None
+
+
+class Described(NamedTuple):
+    """A test: its trigger, and its impact if it was a failure."""
+
+    trigger: Event
+    impact: Event | None
+
+
+def described(evidence: Evidence) -> dict[int, Described]:
+    """Every test of the evidence, by the index of its row."""
+    rows = evidence.rows
+    tests = rows[rows["outcome"].isin(("held", "violated"))]
+    return dict(_each(evidence, tests))
+
+
+def _each(evidence: Evidence, tests: pandas.DataFrame) -> Iterator[tuple[int, Described]]:
+    """The tests one by one; only one trace is in memory at a time."""
+    for index, row in zip(tests.index, tests[USED].to_dict("records"), strict=True):
+        folder = evidence.batches[row["batch"]].csv_file.parent
+        yield int(index), describe(row, folder)
+
+
+def describe(row: Mapping[str, Any], folder: Path) -> Described:
+    """One test, from its row and from the trace it names, relative to a folder."""
+    failed = row["outcome"] == "violated"
+    times = [row["trigger_time_s"], *([row["violation_time_s"]] if failed else [])]
+    moments = read_moments(folder / row["trace"], times) if row["trace"] else [None] * len(times)
+    trigger = _event(moments[0], row["tester"], side_ahead)
+    if not failed:
+        return Described(trigger, None)
+    speed = row["impact_speed_mps"]
+    impact = _event(moments[1], row["tester"], side_hit)
+    return Described(trigger, impact._replace(speed=None if math.isnan(speed) else speed))
+
+
+def _event(moment: Moment | None, tester: str, side: Callable[[Pose, Pose], str]) -> Event:
+    """A moment of a trace; nothing is known without it or without the tester."""
+    if moment is None or tester not in moment[1]["testers"]:
+        return Event()
+    place, frame = moment
+    ego, other = frame["ego"], frame["testers"][tester]
+    speed = ego[2] - other[2] * math.cos(other[3] - ego[3])
+    return Event(speed, side(ego, other), place, other[0], other[1])
+
+
+def side_ahead(ego: Pose, other: Pose) -> str:
+    """Where a body is across the ego's heading."""
+    _, across = _seen(ego, other)
+    if abs(across) <= EGO_KIND.width / 2:
+        return FRONT
+    return LEFT if across > 0 else RIGHT
+
+
+def side_hit(ego: Pose, other: Pose) -> str:
+    """The side of the ego's box from which a body's centre is farthest out, or least deep inside.
+
+    The box is that of cavsumo's egos, 5 m by 1.8 m.
+    """
+    along, across = _seen(ego, other)
+    if abs(along) - EGO_KIND.length / 2 >= abs(across) - EGO_KIND.width / 2:
+        return FRONT if along > 0 else REAR
+    return LEFT if across > 0 else RIGHT
+
+
+def _seen(ego: Pose, other: Pose) -> tuple[float, float]:
+    """A body's centre as the ego sees it: ahead and to the left [m]."""
+    dx, dy, c, s = other[0] - ego[0], other[1] - ego[1], math.cos(ego[3]), math.sin(ego[3])
+    return dx * c + dy * s, dy * c - dx * s

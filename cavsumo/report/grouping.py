@@ -1,0 +1,163 @@
+"""Which rows are told together: those of one agent in one setting, and of one value of a column."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import pandas
+
+from cavsumo.errors import InputError
+from cavsumo.report.load import Batch, Evidence
+from cavsumo.setting import EXTENT, differences
+
+MOST = 200  # groups; more is no report
+# Settings in which batches may differ and still be told together.
+APART = EXTENT | {"agents", "shard", "seed", "trace"}
+# What differs of necessity where rows are grouped by a column, and so must not keep them apart.
+MEANT: dict[str, frozenset[str]] = {
+    "ego": frozenset({"ego", "ego_params"}),
+    "testers": frozenset({"testers", "bodies_per_agent"}),
+    "reset": frozenset({"reset"}),
+    "embodiment": frozenset({"embodiment"}),
+    "sumo_width_m": frozenset({"sumo_width"}),
+    "net": frozenset({"net", "routes", "additional", "ego_route", "junction"}),
+}
+COMPARED = ("versions", "sha256", "sumo_options")  # parts of a manifest, besides the plan
+WITH_FILES = ("net", "file")  # where the files' checksums differ too
+
+
+@dataclass(frozen=True)
+class Told:
+    """What is told of a group; base of the records that say something of one.
+
+    Attributes:
+        setting: which setting, as the names of the files; empty when there is only one.
+        agent: the tester agent.
+        value: the value of the column that rows are grouped by; empty when by agent.
+    """
+
+    setting: str
+    agent: str
+    value: str
+
+    @property
+    def whose(self) -> tuple[str, str, str]:
+        """The setting, the agent and the value."""
+        return self.setting, self.agent, self.value
+
+
+@dataclass(frozen=True)
+class Group(Told):
+    """Rows that are told together.
+
+    Attributes:
+        rows: its rows (``Evidence.rows``), by file and run.
+        sequential: how many rows there are may depend on what they found.
+    """
+
+    rows: pandas.DataFrame
+    sequential: bool
+
+    @property
+    def valid(self) -> pandas.DataFrame:
+        """The rows that count as tried."""
+        return self.rows[~self.rows["outcome"].isin(("error", "invalid"))]
+
+
+def grouped(evidence: Evidence, by: str = "agent") -> list[Group]:
+    """The groups in the order of settings, and of first appearance in each.
+
+    Batches whose scenarios, files and versions agree are one setting (``setting.differences``), so
+    shards and batches of other seeds are told together; but each episode counts once.
+    """
+    if by != "file":  # which tells them apart
+        _check_once(evidence)
+    settings = settings_of(evidence.batches, by)
+    names = _names(evidence.batches, settings)
+    place = evidence.rows["batch"].map(dict(enumerate(settings)))
+    keys = [place, evidence.rows["agent"]]
+    keys += [] if by == "agent" else [evidence.rows[by].map(_word)]
+    found = list(evidence.rows.groupby(keys, sort=False))
+    if len(found) > MOST:
+        raise InputError(f"--by {by}: {len(found)} groups, expected a column with few values")
+    found.sort(key=lambda item: item[0][0])  # stable: within a setting as they appear
+    return [
+        Group(
+            names[key[0]],
+            str(key[1]),
+            "".join(map(str, key[2:])),
+            rows,
+            any(evidence.batches[i].sequential for i in rows["batch"].unique()),
+        )
+        for key, rows in found
+    ]
+
+
+def settings_of(batches: Sequence[Batch], by: str) -> list[int]:
+    """For each batch which setting it is of, numbered from 0 as they appear."""
+    firsts: list[Batch] = []
+    found: list[int] = []
+    for batch in batches:
+        same = (i for i, first in enumerate(firsts) if not any(_apart(first, batch, by)))
+        place = next(same, len(firsts))
+        if place == len(firsts):
+            firsts.append(batch)
+        found.append(place)
+    return found
+
+
+def _apart(first: Batch, second: Batch, by: str) -> Iterator[str]:
+    """What keeps two batches apart."""
+    if by == "file":
+        return iter(())
+    empty: dict[str, Any] = {part: {} for part in COMPARED}
+    left, right = (empty | dict(batch.manifest) for batch in (first, second))
+    if by in WITH_FILES:
+        left, right = left | {"sha256": {}}, right | {"sha256": {}}
+    return differences(left, right, apart=APART | MEANT.get(by, frozenset()))
+
+
+def _names(batches: Sequence[Batch], settings: Sequence[int]) -> dict[int, str]:
+    """The settings by the names of their files; no names when there is but one."""
+    if len(set(settings)) <= 1:
+        return dict.fromkeys(settings, "")
+    names: dict[int, str] = {}
+    for batch, place in zip(batches, settings, strict=True):
+        file = str(batch.csv_file)
+        names[place] = f"{names[place]}, {file}" if place in names else file
+    return names
+
+
+def _check_once(evidence: Evidence) -> None:
+    """Refuse batches that hold the same episode, which would count twice."""
+    if len(evidence.batches) == 1:
+        return
+    settings, plans = settings_of(evidence.batches, "agent"), [b.plan for b in evidence.batches]
+    batch = evidence.rows["batch"]
+    identity = pandas.DataFrame(
+        {
+            "setting": batch.map(dict(enumerate(settings))),
+            "seed": batch.map({i: str(plan.seed) for i, plan in enumerate(plans)}),
+            "agent": evidence.rows["agent"],
+            "episode": evidence.rows["run"] // batch.map(lambda i: len(plans[i].agents)),
+        }
+    )
+    twice = identity.duplicated()
+    if not twice.any():
+        return
+    second: Any = evidence.rows[twice].iloc[0]
+    first: Any = evidence.rows[(identity == identity[twice].iloc[0]).all(axis=1)].iloc[0]
+    raise InputError(
+        f"run {first['run']} of {first['file']!r} and run {second['run']} of {second['file']!r} "
+        "are the same episode; leave one of the files out"
+    )
+
+
+def _word(value: Any) -> str:
+    """A cell as a word, empty for none."""
+    if isinstance(value, float):
+        return "" if math.isnan(value) else f"{value:g}"
+    return str(value)

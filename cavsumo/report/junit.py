@@ -1,0 +1,120 @@
+"""JUnit XML, for continuous integration: a suite a results file, a case an agent and assertion."""
+
+from __future__ import annotations
+
+import re
+import shlex
+import xml.etree.ElementTree as ET
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import pandas
+
+from cavsumo.report.grouping import Group
+from cavsumo.report.load import Batch, Evidence
+from cavsumo.report.rates import Rates, rates
+from cavsumo.summary import event, interval, percent
+
+SHOWN = 20  # failures or errors told of in one case
+# What XML 1.0 cannot hold, even escaped.
+ILLEGAL = re.compile("[^\t\n\r\u0020-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
+
+
+def junit(evidence: Evidence) -> str:
+    """The whole document."""
+    root = ET.Element("testsuites", name="cavsumo")
+    for index, batch in enumerate(evidence.batches):
+        rows = evidence.rows[evidence.rows["batch"] == index]
+        root.append(_suite(batch, rows))
+    _count(root, root.iter("testcase"))
+    ET.indent(root, " ")
+    return '<?xml version="1.0" encoding="UTF-8"?>\n' + ET.tostring(root, "unicode") + "\n"
+
+
+def _suite(batch: Batch, rows: pandas.DataFrame) -> ET.Element:
+    """One results file."""
+    suite = ET.Element("testsuite", name=_legal(str(batch.csv_file)))
+    properties = ET.SubElement(suite, "properties")
+    cases = []
+    for agent in batch.plan.cast:
+        own = rows[rows["agent"] == agent]
+        _properties(properties, agent, rates(Group("", agent, "", own, batch.sequential)))
+        cases += [_case(batch, agent, name, own) for name in batch.plan.scenario.assertions]
+        cases += _errors(agent, own)
+    suite.extend(cases)
+    _count(suite, cases)
+    return suite
+
+
+def _properties(parent: ET.Element, agent: str, found: Rates) -> None:
+    """The shares of an agent with their intervals."""
+    for what, share in (
+        ("tests", found.tests),
+        ("failures", found.failures),
+        ("unfair", found.unfair),
+    ):
+        spans = "; ".join(f"{m} {interval(r)}" for m, r in share.intervals.items() if share.total)
+        text = f"{share.count} of {share.total} {share.of}"
+        if share.total:
+            text += f", {percent(share.value)}, 95 % interval by {spans}"
+        ET.SubElement(parent, "property", name=_legal(f"{agent}.{what}"), value=text)
+
+
+def _case(batch: Batch, agent: str, assertion: str, rows: pandas.DataFrame) -> ET.Element:
+    """One agent and assertion: failed, held, or never put to the test."""
+    tests = rows[rows["outcome"].isin(("held", "violated")) & (rows["assertion"] == assertion)]
+    failures = tests[tests["outcome"] == "violated"]
+    case = ET.Element("testcase", classname=_legal(agent), name=assertion)
+    case.set("time", f"{rows['wall_s'].sum():.3f}")
+    if len(failures):
+        told = [_replay(batch, row) for row in failures.head(SHOWN).to_dict("records")]
+        message = f"{len(failures)} of {len(tests)} tests failed; first: {told[0]}"
+        _add(case, "failure", message, _with_rest(told, len(failures)), assertion)
+    elif not len(tests):
+        valid = int((~rows["outcome"].isin(("error", "invalid"))).sum())
+        message = f"no test of it in {valid} valid episodes: nothing is known"
+        ET.SubElement(case, "skipped", message=message)
+    return case
+
+
+def _replay(batch: Batch, row: Mapping[Any, Any]) -> str:
+    """What happened, and how to see it again."""
+    command = shlex.join(["cavsumo", "replay", str(batch.csv_file), str(row["run"])])
+    return f"run {row['run']} (seed {row['seed']}): {event(row)}: {command}"
+
+
+def _errors(agent: str, rows: pandas.DataFrame) -> list[ET.Element]:
+    """A case of its own for the episodes that could not be played, if there are any."""
+    errors = rows[rows["outcome"] == "error"]
+    if not len(errors):
+        return []
+    case = ET.Element("testcase", classname=_legal(agent), name="episodes can be played")
+    told = [f"run {row['run']}: {row['error']}" for row in errors.head(SHOWN).to_dict("records")]
+    message = f"{len(errors)} of {len(rows)} episodes could not be played; first: {told[0]}"
+    _add(case, "error", message, _with_rest(told, len(errors)), "error")
+    return [case]
+
+
+def _with_rest(told: Sequence[str], total: int) -> str:
+    """What is told, and how much is not."""
+    rest = total - len(told)
+    return "\n".join([*told, *([f"and {rest} more"] if rest else [])])
+
+
+def _add(case: ET.Element, tag: str, message: str, text: str, sort: str) -> None:
+    """The result of a case."""
+    ET.SubElement(case, tag, message=_legal(message), type=_legal(sort)).text = _legal(text)
+
+
+def _count(parent: ET.Element, cases: Any) -> None:
+    """The attributes that add cases up."""
+    cases = list(cases)
+    parent.set("tests", str(len(cases)))
+    for attribute, tag in (("failures", "failure"), ("errors", "error"), ("skipped", "skipped")):
+        parent.set(attribute, str(sum(case.find(tag) is not None for case in cases)))
+    parent.set("time", f"{sum(float(case.get('time', 0)) for case in cases):.3f}")
+
+
+def _legal(text: str) -> str:
+    """Text without what XML cannot hold."""
+    return ILLEGAL.sub("�", text)

@@ -1,0 +1,141 @@
+"""The rows of one or several results files as one table, with what their manifests add."""
+
+from __future__ import annotations
+
+import math
+import operator
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import pandas
+
+from cavsumo.errors import ResultsError, UnknownName
+from cavsumo.outcomes import COLUMNS
+from cavsumo.replays import recorded_plan
+from cavsumo.results import whole_lines
+from cavsumo.scenario import BatchPlan
+from cavsumo.stopping import looks_at_rows
+
+OUTCOMES = ("violated", "held", "unfair", "not_triggered", "invalid", "error")
+# What a report needs of the rows; other columns are read only when asked for.
+NUMBERS = ("trigger_time_s", "violation_time_s", "time_s", "impact_speed_mps", "wall_s")
+WORDS = ("agent", "outcome", "assertion", "tester", "trace", "error")
+WHOLE = ("run", "seed")
+NEEDED = (*WHOLE, *WORDS, *NUMBERS)
+ADDED = ("file", "net")  # what one can group by besides the columns
+
+
+@dataclass(frozen=True)
+class Batch:
+    """One results file.
+
+    Attributes:
+        csv_file, plan, manifest: where it lies, what was played.
+        sequential: how many episodes there are may depend on what they found.
+    """
+
+    csv_file: Path
+    plan: BatchPlan
+    manifest: Mapping[str, Any]
+    sequential: bool
+
+    @property
+    def unfinished(self) -> bool:
+        """Whether episodes are missing and no rule said so."""
+        return self.manifest.get("status") not in ("finished", "stopped")
+
+
+@dataclass(frozen=True)
+class Evidence:
+    """All rows, as a table: one row an episode, in the order of the files and of the runs.
+
+    Attributes:
+        batches: where the rows come from.
+        rows: the columns ``NEEDED``, those of ``ADDED``, the one asked for and ``batch``, the index
+            of the batch. Numbers are floats, NaN for none; words are text, empty for none.
+    """
+
+    batches: tuple[Batch, ...]
+    rows: pandas.DataFrame
+
+
+def check_column(by: str) -> None:
+    """Raise UnknownName unless rows can be grouped by it."""
+    if by not in (*COLUMNS, *ADDED):
+        raise UnknownName("column", by, (*COLUMNS, *ADDED), "--by")
+
+
+def load(files: Sequence[Path], by: str = "agent") -> Evidence:
+    """Read results; raises ResultsError in one sentence for whatever is missing or damaged."""
+    check_column(by)
+    _check_apart(files)
+    batches = [_batch(file) for file in files]
+    tables = [_rows(batch, i, by) for i, batch in enumerate(batches)]
+    rows = pandas.concat(tables, ignore_index=True)
+    return Evidence(tuple(batches), rows)
+
+
+def _check_apart(files: Sequence[Path]) -> None:
+    """Every file once."""
+    seen: set[Path] = set()
+    for file in files:
+        if file.resolve() in seen:
+            raise ResultsError(f"results {str(file)!r}: named twice")
+        seen.add(file.resolve())
+
+
+def _batch(csv_file: Path) -> Batch:
+    """A results file with its manifest."""
+    plan, manifest = recorded_plan(csv_file)
+    return Batch(csv_file, plan, manifest, looks_at_rows(plan))
+
+
+def _rows(batch: Batch, index: int, by: str) -> pandas.DataFrame:
+    """The rows of one file."""
+    file = batch.csv_file
+    columns = list(dict.fromkeys((*NEEDED, *([by] if by in COLUMNS else []))))
+    pick = operator.itemgetter(*columns)
+    cells = [pick(row) for _, row in whole_lines(file) if row is not None]
+    table = pandas.DataFrame(cells, columns=columns, dtype="object")
+    for column in (*WHOLE, *NUMBERS):
+        table[column] = _numbers(table, column, file)
+    _check_outcomes(table, file)
+    return table.assign(batch=index, file=str(file), net=batch.plan.scenario.name)
+
+
+def _numbers(table: pandas.DataFrame, column: str, file: Path) -> pandas.Series:
+    """A column as numbers, whole ones for the seeds."""
+    numbers = pandas.to_numeric(table[column].where(table[column] != ""), errors="coerce")
+    wrong = (numbers.isna() & (table[column] != "")) | numbers.isin((math.inf, -math.inf))
+    if column in WHOLE:
+        wrong |= numbers.isna() | (numbers % 1 != 0)
+    _refuse(table, wrong, column, "a whole number" if column in WHOLE else "a number", file)
+    return numbers.astype("int64" if column in WHOLE else "float64")
+
+
+def _check_outcomes(table: pandas.DataFrame, file: Path) -> None:
+    """Outcomes must be ours, and tests must say when."""
+    _refuse(
+        table, ~table["outcome"].isin(OUTCOMES), "outcome", "one of " + ", ".join(OUTCOMES), file
+    )
+    tests = table["outcome"].isin(("held", "violated"))
+    for column, whose in (
+        ("trigger_time_s", tests),
+        ("violation_time_s", table["outcome"] == "violated"),
+        ("time_s", table["outcome"] != "error"),
+    ):
+        _refuse(table, whose & table[column].isna(), column, "a number", file)
+
+
+def _refuse(
+    table: pandas.DataFrame, wrong: pandas.Series, column: str, expected: str, file: Path
+) -> None:
+    """Raise ResultsError for the first wrong cell."""
+    if wrong.any():
+        row = table[wrong].iloc[0]
+        cell = "" if row[column] != row[column] else str(row[column])
+        raise ResultsError(
+            f"results {str(file)!r}: run {row['run']}: {column} is {cell!r}, expected {expected}"
+        )

@@ -1,0 +1,307 @@
+"""A report as tables of text, which any format can print."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+from cavsumo.report.analysis import Report
+from cavsumo.report.compare import EVENTS, Comparison
+from cavsumo.report.distinct import PLACE_BIN, SPEED_BIN, Distinct, Diversity, FailureCell
+from cavsumo.report.effort import Effort, PerSecond
+from cavsumo.report.grouping import Told
+from cavsumo.report.load import Batch
+from cavsumo.report.pairs import Interval
+from cavsumo.report.rates import EXACT, SEQUENTIAL, WILSON, Rates, Share
+from cavsumo.report.survival import TimeToTest
+from cavsumo.summary import interval, percent
+
+TOPICS = ("results", "shares", "pairs", "times", "effort", "distinct")
+SHOWN = 10  # cells of failures
+
+
+@dataclass(frozen=True)
+class Table:
+    """A table of text.
+
+    Attributes:
+        topic: what it belongs to, one of ``TOPICS``.
+        title: what it tells.
+        words: the titles of its first columns, which hold words and stand to the left.
+        numbers: the titles of the others, which hold numbers and stand to the right.
+        rows: one cell a column.
+        heads: in how many of the first columns words that repeat those above may be left out.
+        topic: what it belongs to, one of ``TOPICS``.
+        notes: what one must know to read it, a sentence each.
+    """
+
+    topic: str
+    title: str
+    words: Sequence[str]
+    numbers: Sequence[str]
+    rows: Sequence[Sequence[str]]
+    notes: Sequence[str] = ()
+    heads: int = 0
+
+
+class Labels:
+    """The columns that say of whom a row is, as few as are needed."""
+
+    def __init__(self, report: Report) -> None:
+        several = any(group.setting for group in report.groups)
+        self.titles = [*(["setting"] if several else []), "agent"]
+        self.titles += [] if report.by == "agent" else [report.by]
+
+    def cells(self, of: Told) -> list[str]:
+        """The cells for a group."""
+        words = {"setting": of.setting, "agent": of.agent}
+        return [words.get(title, of.value or "(none)") for title in self.titles]
+
+
+def tables(report: Report) -> Iterator[Table]:
+    """All tables that have anything to say."""
+    labels = Labels(report)
+    yield _batches(report.evidence.batches, report)
+    if not report.groups:
+        return
+    yield _rates(report.rates, labels)
+    yield from _comparisons(report, labels)
+    yield _times(report.times, labels)
+    yield _effort(report, labels)
+    yield _distinct(report.distinct, labels)
+    if report.failures:
+        yield _failures(report.failures, len(report.evidence.batches) > 1)
+
+
+def _batches(batches: Sequence[Batch], report: Report) -> Table:
+    """What was read."""
+    counts = report.evidence.rows["batch"].value_counts()
+    rows = []
+    for i, batch in enumerate(batches):
+        scenario, status = batch.plan.scenario, batch.manifest.get("status", "")
+        testers = f"{scenario.testers} x {scenario.kind}"
+        episodes = f"{int(counts.get(i, 0))} of {batch.plan.size}"
+        cells = [str(batch.csv_file), scenario.name, testers, scenario.ego, str(status)]
+        rows.append([*cells, str(batch.plan.seed), episodes])
+    words = ("results", "network", "testers", "ego", "status")
+    return Table(
+        "results", "Results", words, ("seed", "episodes"), rows, list(_batch_notes(batches))
+    )
+
+
+def _batch_notes(batches: Sequence[Batch]) -> Iterator[str]:
+    """What is special about them."""
+    for batch in batches:
+        if batch.sequential:
+            reason = batch.manifest.get("stopped_by")
+            why = f"was stopped: {reason}" if reason else "could have been stopped by what it found"
+            yield (
+                f"{batch.csv_file} {why}. Its intervals of rates and ratios and its p-values hold "
+                "whenever one stops; times, figures per second and numbers of cells do not allow "
+                "for it."
+            )
+        elif batch.unfinished:
+            yield (
+                f"{batch.csv_file} is unfinished: the figures hold as long as it was not stopped "
+                "for what it had found."
+            )
+
+
+def _rates(found: Sequence[Rates], labels: Labels) -> Table:
+    """Shares with intervals."""
+    shares = [share for one in found for share in (one.tests, one.failures, one.unfair)]
+    methods = [m for m in (WILSON, EXACT, SEQUENTIAL) if any(m in s.intervals for s in shares)]
+    rows = []
+    for one in found:
+        for what in ("tests", "failures", "unfair"):
+            share: Share = getattr(one, what)
+            cells = [what, str(share.count), f"of {share.total} {share.of}", percent(share.value)]
+            spans = [interval(share.intervals[m]) if m in share.intervals else "" for m in methods]
+            rows.append([*labels.cells(one), *cells, *spans])
+        if one.errors:
+            cells = ["errors", str(one.errors), f"of {one.episodes} episodes", ""]
+            rows.append([*labels.cells(one), *cells, *("" for _ in methods)])
+    titles = ("count", "", "share", *methods)
+    words = (*labels.titles, "of what")
+    return Table(
+        "shares", "Shares, with 95 % intervals in %", words, titles, rows, heads=len(words) - 1
+    )
+
+
+def _comparisons(report: Report, labels: Labels) -> Iterator[Table]:
+    """Who finds more on the same seeds."""
+    words = [title for title in labels.titles if title == "setting"]
+    words += ["agent"] if report.by != "agent" else []
+    numbers = ("pairs", "only first", "only second", "ratio", "95 % interval", "p", "p (Holm)")
+    for event in EVENTS:
+        found = [c for c in report.comparisons if c.event == event]
+        if found:
+            rows = [_comparison(one, words) for one in found]
+            title = f"{event.capitalize()} on the same seeds"
+            notes = () if event == "tests" else _comparison_notes(report.comparisons)
+            yield Table("pairs", title, (*words, "first : second"), numbers, rows, notes)
+
+
+def _comparison(one: Comparison, words: Sequence[str]) -> list[str]:
+    """One line of them."""
+    who = [getattr(one, word) for word in words]
+    return [
+        *who,
+        f"{one.first or '(none)'} : {one.second or '(none)'}",
+        str(one.pairs.total),
+        str(one.pairs.first),
+        str(one.pairs.second),
+        "" if one.ratio is None else number(one.ratio),
+        _span(one.interval),
+        _p(one.p),
+        _p(one.p_holm),
+    ]
+
+
+def _comparison_notes(found: Sequence[Comparison]) -> list[str]:
+    """By which methods."""
+    methods = []
+    if any(not one.sequential for one in found):
+        methods.append(
+            "Ratio of the first's rate per valid episode to the second's with the score interval "
+            "for pairs (Nam and Blackwelder); p: exact McNemar test."
+        )
+    if any(one.sequential for one in found):
+        methods.append(
+            "After stopping: ratio with the interval from both rates' confidence sequences, p of "
+            "McNemar's hypothesis by the same martingale."
+        )
+    return [*methods, f"Holm: adjusted for all {len(found)} comparisons, of tests and failures."]
+
+
+def _times(found: Sequence[TimeToTest], labels: Labels) -> Table:
+    """When tests come."""
+    limit = next((one.limit for one in found if one.limit is not None), None)
+    mean = "mean" if limit is None else f"mean to {limit:.1f}"
+    rows = [
+        [
+            *labels.cells(one),
+            str(one.censored),
+            "" if one.median is None else f"{one.median:.1f}",
+            _span(one.median_interval, ".1f"),
+            "" if one.mean is None else f"{one.mean:.1f}",
+            _span(one.mean_interval, ".1f"),
+            *("none" if n is None else str(n) for n in (one.first_test, one.first_failure)),
+        ]
+        for one in found
+    ]
+    numbers = ("censored", "median", "95 %", mean, "95 %", "1st test", "1st failure")
+    notes = [
+        "Seconds by Kaplan and Meier. Episodes without a test are censored at their end, unfair "
+        "ones too: a tester that came too early shows only that there was no test so far.",
+        "1st test, 1st failure: in which valid episode.",
+    ]
+    return Table(
+        "times", "Time to the test, within an episode [s]", labels.titles, numbers, rows, notes
+    )
+
+
+def _effort(report: Report, labels: Labels) -> Table:
+    """What tests and failures cost."""
+    rows = []
+    for rate, one in zip(report.rates, report.efforts, strict=True):
+        for what in EVENTS:
+            simulated: PerSecond = getattr(one, f"{what}_simulated")
+            real: PerSecond = getattr(one, f"{what}_real")
+            count: Share = getattr(rate, what)
+            cells = [*labels.cells(one), what, str(count.count)]
+            rows.append([*cells, *_effort_cells(simulated), *_effort_cells(real)])
+    numbers = ("count", "per simulated s", "95 % interval", "per CPU s", "95 % interval")
+    notes = [f"{_total(report.efforts)} CPU s: real time of the processes that played."]
+    words = (*labels.titles, "")
+    return Table("effort", "Found per second", words, numbers, rows, notes, heads=len(words) - 1)
+
+
+def _effort_cells(found: PerSecond) -> list[str]:
+    """A figure per second with its interval."""
+    return ["" if found.value is None else number(found.value), _span(found.interval)]
+
+
+def _total(efforts: Sequence[Effort]) -> str:
+    """How long it all took."""
+    simulated, real = sum(e.simulated_s for e in efforts), sum(e.real_s for e in efforts)
+    return f"{simulated:,.0f} s were simulated in {real:,.1f}"
+
+
+def _distinct(found: Sequence[Distinct], labels: Labels) -> Table:
+    """How many differ."""
+    rows = []
+    for one in found:
+        for what in EVENTS:
+            diversity: Diversity = getattr(one, what)
+            rows.append([*labels.cells(one), what, *_diversity_cells(diversity)])
+    numbers = ("count", "cell known", "distinct", "estimated", "next is new")
+    notes = [
+        f"A cell: closing speed in steps of {SPEED_BIN:g} m/s, side of the ego, its way so far in "
+        f"steps of {PLACE_BIN:g} m, kind of tester; of tests at the trigger, of failures at the "
+        "impact.",
+        "Estimated: all cells there are, met or not, at least (Chao); next is new: by Good and "
+        "Turing.",
+    ]
+    missing = sum(d.total - d.known for one in found for d in (one.tests, one.failures))
+    if missing:
+        notes.append("Where no trace was kept the cell is not known.")
+    words = (*labels.titles, "")
+    return Table(
+        "distinct", "How many are distinct", words, numbers, rows, notes, heads=len(words) - 1
+    )
+
+
+def _diversity_cells(diversity: Diversity) -> list[str]:
+    """How many differ, in one group."""
+    estimate = "" if diversity.estimate is None else f"{diversity.estimate:.0f}"
+    counts = [diversity.total, diversity.known, diversity.cells]
+    return [*map(str, counts), estimate, percent(diversity.new)]
+
+
+def _failures(found: Sequence[FailureCell], several: bool) -> Table:
+    """The most frequent cells of failures, each with one to look at."""
+    rows = []
+    settings = any(one.cell.setting for one in found)
+    for one in found[:SHOWN]:
+        cell = one.cell
+        run = f"{one.file} {one.run}" if several else str(one.run)
+        speed = f"{cell.speed:g} to {cell.speed + SPEED_BIN:g}"
+        place = f"{cell.place:g} to {cell.place + PLACE_BIN:g}"
+        words = [cell.kind, cell.side, ", ".join(one.agents)]
+        words = [cell.setting, *words] if settings else words
+        rows.append([*words, speed, place, str(one.count), run])
+    words = ["tester", "hit on", "found by"]
+    notes = []
+    if len(found) > SHOWN:
+        rest = sum(one.count for one in found[SHOWN:])
+        notes.append(f"{rest} failures in {len(found) - SHOWN} more cells are not shown.")
+    notes.append(f"To see one: cavsumo replay {'RESULTS' if several else found[0].file} RUN")
+    numbers = ("at [m/s]", "after [m]", "failures", "run")
+    words = ["setting", *words] if settings else words
+    return Table(
+        "distinct", "Failures by cell, the most frequent first", words, numbers, rows, notes
+    )
+
+
+def number(value: float) -> str:
+    """Three significant digits, without an exponent where that can be read."""
+    if math.isinf(value) or value == 0:
+        return f"{value:g}"
+    if abs(value) < 1e-4 or abs(value) >= 1e5:
+        return f"{value:.2e}"
+    digits = max(0, 2 - math.floor(math.log10(abs(value))))
+    return f"{value:.{digits}f}"
+
+
+def _span(ends: Interval | None, form: str = "") -> str:
+    """An interval, empty for none."""
+    if ends is None:
+        return ""
+    return "[{}, {}]".format(*(number(e) if not form else format(e, form) for e in ends))
+
+
+def _p(value: float) -> str:
+    """A p-value."""
+    return "< 0.001" if value < 0.001 else f"{value:.3f}"
