@@ -11,6 +11,7 @@ from typing import Any, NoReturn
 
 from cavsumo import __version__
 from cavsumo.cli_egos import add_check_ego
+from cavsumo.cli_games import add_game
 from cavsumo.cli_networks import add_import_osm, add_inspect
 from cavsumo.cli_results import add_merge, add_replay, add_report
 from cavsumo.cli_settings import parts_of
@@ -76,6 +77,7 @@ def _parser() -> argparse.ArgumentParser:
     add_check_ego(commands)
     add_inspect(commands)
     add_import_osm(commands)
+    add_game(commands)
     for sort, text in (
         ("agents", "list the tester agents"),
         ("egos", "list the vehicles under test"),

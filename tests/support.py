@@ -1,7 +1,8 @@
-"""What several test files use to look at batches and at the processes that play them."""
+"""What several test files use: benchmarks, batches, and the processes that play them."""
 
 from __future__ import annotations
 
+import importlib.util
 import shutil
 import time
 from collections.abc import Callable
@@ -22,6 +23,17 @@ LAPTOP, PHONE = {"width": 1280, "height": 800}, {"width": 390, "height": 844}
 # Settings of a short environment on the straight road.
 STRAIGHT_NET = str(Path(__file__).parents[1] / "networks" / "pedestrians.net.xml")
 SHORT = {"net": STRAIGHT_NET, "routes": "none", "end": 6.0}
+
+
+def benchmark(name: str) -> Any:
+    """A module of benchmarks/, which is no package."""
+    file = Path(__file__).parents[1] / "benchmarks" / f"{name}.py"
+    spec = importlib.util.spec_from_file_location(name, file)
+    assert spec is not None
+    assert spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
 
 
 def rows(file: Path) -> list[dict[str, str]]:

@@ -16,8 +16,12 @@ PACKAGE = Path(cavsumo.__file__).parent
 
 # From the ground up: a module uses only what stands before it, lazily or not.
 ORDER = """
-    cavsumo errors checks registry imports processes kinematics geometry paths bodies snapshot
-    fairness roads sumo_poses background
+    cavsumo errors checks registry imports processes
+    games.model games.build games.files games.readings games.regions games.components
+    games.solvable games.policies games.chains games.evaluation games.proper games.certificate
+    games.flow games.arena games.kernel games.backups games.matrix_games games.pairs games.plays
+    games.solve games games.drawing games.pictures
+    kinematics geometry paths bodies snapshot fairness roads sumo_poses background
     metrics.following metrics.rss metrics.highway_code metrics.zones metrics.plane
     metrics.encroachment metrics
     network ego_routes lane_chains approaches starts vehicle_starts kerbs signals trips traffic
@@ -55,8 +59,8 @@ ORDER = """
     report.page.document report.page
     testing.scripts testing.ego_checks testing.agent_checks testing.assertion_checks testing
     commands commands.run commands.replay commands.merge commands.report commands.inspect
-    commands.import_osm commands.check_ego
-    cli_settings cli_egos cli_networks cli_results cli __main__
+    commands.import_osm commands.check_ego commands.game
+    cli_settings cli_egos cli_networks cli_results cli_games cli __main__
 """.split()
 
 HEAVY = {"numpy", "pandas", "scipy", "shapely", "libsumo", "sumolib", "pydantic", "rich"}

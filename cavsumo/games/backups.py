@@ -1,0 +1,62 @@
+"""The Bellman operator of readings A and C, in numpy; values have a last entry 0 for the goals.
+
+A:  (T V)(s) = max over a1 of min over a2 of  r + sum over s' of T(s, a1, a2, s') V(s')
+C:  (T V)(s) = min over a2 of max over a1 of  the same
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from cavsumo.games.arena import Arena, Block
+from cavsumo.games.model import Floats, Ints
+from cavsumo.games.readings import Reading
+
+
+def sweep(arena: Arena, value: Floats, shift: float) -> None:
+    """One Gauss-Seidel sweep of V <- T V + shift in place, block by block."""
+    outer, inner = _operators(arena)
+    for block in arena.blocks:
+        value[block.states] = _swept(arena, block, value, outer, inner) + shift
+
+
+def _operators(arena: Arena) -> tuple[np.ufunc, np.ufunc]:
+    """What the one who chooses groups does, and the other."""
+    if arena.reading is Reading.C:
+        return np.minimum, np.maximum
+    return np.maximum, np.minimum
+
+
+def _swept(arena: Arena, block: Block, value: Floats, outer: np.ufunc, inner: np.ufunc) -> Floats:
+    """New values of a block."""
+    terms = arena.probability[block.outcomes] * value[arena.successor[block.outcomes]]
+    q: Floats = np.add.reduceat(terms, block.cell_outcome)
+    q += arena.reward[block.cells]
+    if block.group_cell is not None:
+        q = inner.reduceat(q, block.group_cell)
+    return q if block.state_group is None else outer.reduceat(q, block.state_group)
+
+
+def backup(arena: Arena, value: Floats) -> tuple[Floats, Ints]:
+    """T V, with its 0 for the goals, and for each state the cell that attains it."""
+    outer, inner = _operators(arena)
+    q = arena.matrix @ value + arena.reward
+    answer = inner.reduceat(q, arena.group_cell[:-1])
+    best = outer.reduceat(answer, arena.state_group[:-1])
+    group = _first(answer == best[arena.group_state], arena.state_group)
+    cell = _first(q == answer[arena.cell_group], arena.group_cell)
+    return np.append(best, 0.0), cell[group]
+
+
+def answers(arena: Arena, value: Floats) -> Ints:
+    """For each group the cell that the one who answers takes."""
+    _, inner = _operators(arena)
+    q = arena.matrix @ value + arena.reward
+    best = inner.reduceat(q, arena.group_cell[:-1])
+    return _first(q == best[arena.cell_group], arena.group_cell)
+
+
+def _first(true: np.ndarray, start: Ints) -> Ints:
+    """The place of the first true entry of each part; every part has one."""
+    places = np.flatnonzero(true)
+    return places[np.searchsorted(places, start[:-1])]

@@ -1,0 +1,81 @@
+"""The Bellman operator as compiled loops; needs the package numba (extra ``fast``).
+
+The same operator as ``backups``, several times faster: no intermediate arrays, and Gauss-Seidel
+state by state instead of block by block. Compiled on first use and cached by numba.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numba import njit
+
+from cavsumo.games.arena import Arena
+from cavsumo.games.model import Floats, Ints
+from cavsumo.games.readings import Reading
+
+
+def sweep(arena: Arena, value: Floats, shift: float) -> None:
+    """One Gauss-Seidel sweep of V <- T V + shift in place."""
+    _sweep(*_parts(arena), value, shift)
+
+
+@njit(cache=True, nogil=True)
+def _sweep(sign, states, groups, cells, successor, probability, reward, value, shift):  # type: ignore[no-untyped-def]
+    """``sign`` is 1 where groups are maximised and their cells minimised, -1 the other way."""
+    for s in range(len(states) - 1):
+        best = -math.inf
+        for g in range(states[s], states[s + 1]):
+            least = math.inf
+            for c in range(groups[g], groups[g + 1]):
+                q = reward[c]
+                for k in range(cells[c], cells[c + 1]):
+                    q += probability[k] * value[successor[k]]
+                least = min(least, sign * q)
+                if least <= best:
+                    break
+            best = max(best, least)
+        value[s] = sign * best + shift
+
+
+def _parts(arena: Arena) -> tuple[object, ...]:
+    """What the loops go over."""
+    return (
+        -1.0 if arena.reading is Reading.C else 1.0,
+        arena.state_group,
+        arena.group_cell,
+        arena.cell_outcome,
+        arena.successor,
+        arena.probability,
+        arena.reward,
+    )
+
+
+def backup(arena: Arena, value: Floats) -> tuple[Floats, Ints]:
+    """T V, with its 0 for the goals, and for each state the cell that attains it."""
+    best = np.zeros(arena.size + 1)
+    chosen = np.zeros(arena.size, dtype=np.int64)
+    _backup(*_parts(arena), value, best, chosen)
+    return best, chosen
+
+
+@njit(cache=True, nogil=True)
+def _backup(sign, states, groups, cells, successor, probability, reward, value, out, chosen):  # type: ignore[no-untyped-def]
+    """As ``_sweep``, into ``out``, noting the cells."""
+    for s in range(len(states) - 1):
+        best, taken = -math.inf, 0
+        for g in range(states[s], states[s + 1]):
+            least, answer = math.inf, 0
+            for c in range(groups[g], groups[g + 1]):
+                q = reward[c]
+                for k in range(cells[c], cells[c + 1]):
+                    q += probability[k] * value[successor[k]]
+                if sign * q < least:
+                    least, answer = sign * q, c
+                if least <= best:
+                    break
+            if least > best:
+                best, taken = least, answer
+        out[s] = sign * best
+        chosen[s] = taken

@@ -1,0 +1,30 @@
+"""Who knows what when both choose: the three readings of an SSP game.
+
+A: the tester commits first, to a pure choice, and the ego answers: max over a1 of min over a2.
+   The tree of the seed's Figure 2, and the only reading whose tests hold against any ego.
+B: both choose at once, with mixed strategies: a matrix game in each state.
+C: the ego commits first: min over a2 of max over a1. An optimistic bound.
+
+Always V_A <= V_B <= V_C (``docs/games.md``).
+"""
+
+from __future__ import annotations
+
+from enum import StrEnum
+
+
+class Reading(StrEnum):
+    """Which reading of the game is asked for."""
+
+    A = "A"
+    B = "B"
+    C = "C"
+
+    @property
+    def order(self) -> str:
+        """The order of moves in words."""
+        return {
+            "A": "the tester commits first",
+            "B": "both choose at once",
+            "C": "the ego commits first",
+        }[self.value]
