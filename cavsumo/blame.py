@@ -120,6 +120,8 @@ def answered_improperly(case: Case) -> float | None:
     ACCEL for RHO_S, then brakes by at least B_MIN (B_MIN_CORRECT before one that comes towards it)
     until it stands. The time is when it first failed to.
     """
+    if case.body is None:
+        return None
     since: float | None = None
     for (before, after), there in zip(pairwise(case.snapshots), case.relations[1:], strict=True):
         if not (there.in_way and there.ahead > 0.0 and there.ahead < _safe(after, there)):

@@ -46,8 +46,11 @@ def played(staged: Staged, monkeypatch: pytest.MonkeyPatch) -> Any:
     """
     open_stages: list[Stage] = []
 
-    def one(start: Start, ego: Ego | None = None, agent: Agent | None = None) -> Retrial:
-        plan, site = staged("pedestrians", testers=1, assertions=["collision"], end=20.0)
+    def one(
+        start: Start, ego: Ego | None = None, agent: Agent | None = None, **asserted: Any
+    ) -> Retrial:
+        asserted = asserted or {"assertions": ["collision"]}
+        plan, site = staged("pedestrians", testers=1, end=20.0, **asserted)
         ego = ego or make_ego("constant", {"speed": SPEED})
         monkeypatch.setattr(Site, "draw", lambda *_: (start,))
         stage = set_stage(plan.scenario, site, ego)
@@ -240,6 +243,33 @@ def test_a_standing_ego_is_not_judged(played: Played) -> None:
     episode = dataclasses.replace(retrial.episode, frames=stood)
     object.__setattr__(retrial, "episode", episode)
     assert judged(retrial, "human").note.startswith("not judged: the ego stood")
+
+
+def test_of_several_assertions_the_one_violated_first_is_asked_again(played: Played) -> None:
+    """TTC below 3 s is avoided by braking just before; the others still show what they saw."""
+    retrial = played(standing(), assertions=["collision", "red-light", "ttc"])
+    assert retrial.episode.verdicts["collision"] == "violated"
+    assert retrial.broken.name == retrial.episode.judgement.assertion == "ttc"
+    for name, least, most in (("ideal", 0.05, 0.35), ("human", 1.15, 2.0)):
+        found = judged(retrial, name)
+        assert (found.avoidable, found.note) == (True, ""), name
+        assert found.margin is not None
+        assert least < found.margin < most, name
+
+
+def test_a_formula_that_names_nobody_is_asked_again_to_the_end(played: Played) -> None:
+    """To keep 5 m from a pedestrian the brake must come a way to stop earlier."""
+    retrial = played(standing(), formulas={"apart": "always (gap_m > 5)"})
+    assert retrial.episode.judgement.tester == ""
+    found = judged(retrial, "ideal")
+    assert (found.avoidable, found.note) == (True, "")
+    assert found.margin == pytest.approx(way_to_stop("ideal") / SPEED, abs=2 * DT)
+
+
+def test_a_formula_broken_from_the_start_nobody_keeps(played: Played) -> None:
+    """Its first timestep belongs to the original."""
+    retrial = played(standing(), formulas={"slow": "always (speed_mps < 5)"})
+    assert judged(retrial, "ideal") == Verdict(False)
 
 
 # In batches

@@ -137,6 +137,13 @@ def test_no_blame_without_a_violation(straight: Stage) -> None:
     assert (episode.outcome, episode.blame) == ("held", "")
 
 
+def test_a_violation_that_names_nobody_is_judged_by_the_rules_of_the_ego(straight: Stage) -> None:
+    """Nobody can have stepped out, and RSS has no body to answer to."""
+    aside = [straight.beside(40.0, -3.0, LEFT)]
+    said, episode = straight.play("speed-limit", at(20.0), places=aside, start=20.0)
+    assert (said.verdict, said.tester, episode.blame) == ("violated", "", "ego:speed")
+
+
 def test_every_rule_was_seen() -> None:
     """Each of them decided at least one of these episodes."""
     if len(SEEN) > 1:  # not when run alone

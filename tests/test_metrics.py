@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from cavsumo import metrics
@@ -63,6 +63,19 @@ def test_metrics_take_arrays() -> None:
     assert both == pytest.approx([2.85291289864636, math.inf])
 
 
+@pytest.mark.filterwarnings("error")
+def test_what_is_too_long_for_a_float_takes_for_ever() -> None:
+    """A closing speed of the smallest float there is: infinite times, and no warning."""
+    least = 5e-324
+    assert metrics.ttc_following(30.0, least, 0.0) == math.inf
+    assert metrics.mttc(30.0, least, 0.0, 0.0, 0.0) == math.inf
+    assert (
+        metrics.ttc_2d_discs((0.0, 0.0), (least, 0.0), 1.0, (9.0, 0.0), (0.0, 0.0), 1.0) == math.inf
+    )
+    assert metrics.drac(least, 10.0, 0.0) == math.inf
+    assert metrics.mdrac(30.0, least, 0.0, 1.0) == 0.0
+
+
 def test_the_highway_codes_table() -> None:
     """Rule 126, every row; rule 227 doubles it; a speed that is none is refused."""
     table = {20: (6, 6), 30: (9, 14), 40: (12, 24), 50: (15, 38), 60: (18, 55), 70: (21, 75)}
@@ -77,6 +90,7 @@ def test_the_highway_codes_table() -> None:
             metrics.uk_stopping_distance(**speeds)  # type: ignore[arg-type]
 
 
+@example(30.0, 5e-324, 0.0, 0.0, 0.0)
 @given(st.floats(0.1, 100), st.floats(0, 40), st.floats(0, 40), *[st.floats(-8, 8)] * 2)
 def test_mttc_is_a_time_at_which_they_meet(
     distance: float, follow: float, lead: float, a: float, b: float
@@ -113,6 +127,7 @@ def moved(box: tuple[float, ...], v: tuple[float, float], t: float) -> Box:
     return Box(box[0] + v[0] * t, box[1] + v[1] * t, *box[2:])
 
 
+@example(20.0, 10.0, 5.0, 2.2e-311)
 @given(st.floats(0.5, 60), st.floats(0, 30), st.floats(0, 30), angles)
 def test_behind_one_another_the_plane_is_a_line(
     distance: float, follow: float, lead: float, heading: float

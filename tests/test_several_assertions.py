@@ -93,6 +93,9 @@ def test_a_batch(
         assert tuple(verdicts) == NAMES
         if row["assertion"]:
             assert verdicts[row["assertion"]] == row["outcome"]
+        if row["outcome"] == VIOLATED:
+            assert row["reference"] == "human"
+            assert row["avoidable"] in ("0", "1"), row["avoidable_note"]
         if row["robustness"]:
             assert (float(row["robustness"]) < 0.0) == (row["outcome"] == VIOLATED)
     counted = tally.agents["timing"].verdicts

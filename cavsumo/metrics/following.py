@@ -3,6 +3,7 @@
 All functions take numbers or arrays that broadcast and return arrays of the common shape. Gaps are
 from the follower's front to the leader's rear [m], speeds [m/s], accelerations [m/s2], times [s].
 Where a follower does not close in there is nothing to avoid: times are infinite, decelerations 0.
+What is too large for a float is infinite.
 """
 
 from __future__ import annotations
@@ -16,7 +17,7 @@ Numbers = NDArray[np.float64]
 def ttc_following(gap: ArrayLike, v_follow: ArrayLike, v_lead: ArrayLike) -> Numbers:
     """Time to collision at constant speeds, gap / (v_follow - v_lead) (Hayward 1972) [s]."""
     distance, closing = _closing(gap, v_follow, v_lead)
-    with np.errstate(divide="ignore", invalid="ignore"):
+    with np.errstate(over="ignore", divide="ignore", invalid="ignore"):
         time = np.where(closing > 0.0, distance / closing, np.inf)
     return np.where(distance <= 0.0, 0.0, time)
 
@@ -37,7 +38,7 @@ def mttc(
     change = np.asarray(a_follow, float) - np.asarray(a_lead, float)
     distance, closing, change = np.broadcast_arrays(distance, closing, change)
     root = closing**2 + 2.0 * change * distance
-    with np.errstate(divide="ignore", invalid="ignore"):
+    with np.errstate(over="ignore", divide="ignore", invalid="ignore"):
         # 2 D / (dv + sqrt(...)) is the root met first, without cancellation and for da = 0 too.
         first = 2.0 * distance / (closing + np.sqrt(root))
     met = (root >= 0.0) & (closing + np.sqrt(np.maximum(root, 0.0)) > 0.0)
@@ -47,7 +48,7 @@ def mttc(
 def drac(gap: ArrayLike, v_follow: ArrayLike, v_lead: ArrayLike) -> Numbers:
     """Deceleration to avoid a crash, (v_follow - v_lead)^2 / (2 gap) (Guido et al. 2011) [m/s2]."""
     distance, closing = _closing(gap, v_follow, v_lead)
-    with np.errstate(divide="ignore", invalid="ignore"):
+    with np.errstate(over="ignore", divide="ignore", invalid="ignore"):
         needed = np.where(distance > 0.0, closing**2 / (2.0 * distance), np.inf)
     return np.where(closing > 0.0, needed, 0.0)
 
@@ -61,7 +62,7 @@ def mdrac(
     """
     _, closing = _closing(gap, v_follow, v_lead)
     left = ttc_following(gap, v_follow, v_lead) - np.asarray(reaction_time, float)
-    with np.errstate(divide="ignore", invalid="ignore"):
+    with np.errstate(over="ignore", divide="ignore", invalid="ignore"):
         needed = np.where(left > 0.0, closing / (2.0 * left), np.inf)
     return np.where(closing > 0.0, needed, 0.0)
 

@@ -31,7 +31,7 @@ def ttc_2d_discs(
     speed2, along = _dot(moving, moving), _dot(apart, moving)
     excess = _dot(apart, apart) - reach**2
     root = along**2 - speed2 * excess
-    with np.errstate(divide="ignore", invalid="ignore"):
+    with np.errstate(over="ignore", divide="ignore", invalid="ignore"):
         # excess / (-along + sqrt(...)) is the first root without cancellation.
         time = excess / (-along + np.sqrt(root))
     meet = (root >= 0.0) & (along < 0.0)
@@ -65,7 +65,7 @@ def drac_at(first: ArrayLike, v1: ArrayLike, v2: ArrayLike, ttc: ArrayLike) -> N
     heading, time = np.asarray(first, float)[..., 2], np.asarray(ttc, float)
     ahead = np.stack([np.cos(heading), np.sin(heading)], axis=-1)
     closing = _dot(np.asarray(v1, float) - np.asarray(v2, float), ahead)
-    with np.errstate(divide="ignore", invalid="ignore"):
+    with np.errstate(over="ignore", divide="ignore", invalid="ignore"):
         needed = closing / (2.0 * time)
     needed = np.where(closing > 0.0, needed, 0.0)
     return np.where((closing > 0.0) & (time == 0.0), np.inf, needed)
@@ -78,7 +78,7 @@ def closest_approach(
     apart = np.asarray(p2, float) - np.asarray(p1, float)
     moving = np.asarray(v2, float) - np.asarray(v1, float)
     speed2 = _dot(moving, moving)
-    with np.errstate(divide="ignore", invalid="ignore"):
+    with np.errstate(over="ignore", divide="ignore", invalid="ignore"):
         time = np.where(speed2 > 0.0, np.maximum(0.0, -_dot(apart, moving) / speed2), 0.0)
     there = apart + moving * time[..., None]
     return time, np.sqrt(_dot(there, there))
@@ -94,7 +94,7 @@ def _overlap(
     reach = _shadow(a, axes) + _shadow(b, axes)
     where = np.einsum("...ij,...j->...i", axes, apart)
     speed = np.einsum("...ij,...j->...i", axes, np.broadcast_to(moving, apart.shape))
-    with np.errstate(divide="ignore", invalid="ignore"):
+    with np.errstate(over="ignore", divide="ignore", invalid="ignore"):
         times = np.stack([(-reach - where) / speed, (reach - where) / speed])
     still, inside = speed == 0.0, np.abs(where) <= reach
     enter = np.where(still, np.where(inside, -np.inf, np.inf), np.min(times, axis=0))
