@@ -219,7 +219,7 @@ def test_invalid_episodes_are_counted_apart() -> None:
     import pandas
 
     group: Any = SimpleNamespace(
-        rows=pandas.DataFrame({"outcome": ["held", "invalid"]}),
+        rows=pandas.DataFrame({"outcome": ["held", "invalid"], "avoidable": math.nan}),
         sequential=False,
         whose=("", "a", ""),
     )

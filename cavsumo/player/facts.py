@@ -55,6 +55,7 @@ def facts(record: Record, trace: Trace) -> list[tuple[str, str]]:
         ("Assertion", " ".join(scenario.assertions)),
         ("Outcome", row["outcome"].replace("_", " ")),
         ("Tester involved", row["tester"]),
+        ("Preventable", _preventable(row)),
         ("Blame", row.get("blame", "")),
         ("Breach", row.get("breach", "")),
         ("Trigger", _with(row["trigger_time_s"], "s")),
@@ -67,6 +68,12 @@ def facts(record: Record, trace: Trace) -> list[tuple[str, str]]:
         ("Versions", ", ".join(f"{k} {v}" for k, v in trace.head["versions"].items())),
     ]
     return [(term, text) for term, text in found if text]
+
+
+def _preventable(row: Mapping[str, str]) -> str:
+    """Whether the reference driver would have avoided it; empty if that was not judged."""
+    answer = {"1": "yes", "0": "no"}.get(row.get("avoidable", ""))
+    return f"{answer}, by the driver {row['reference']!r}" if answer else ""
 
 
 def ego_words(scenario: Scenario) -> str:
