@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from cavsumo.errors import InputError, ResultsError
+from cavsumo.recorder import check_free
 from cavsumo.results import check_replaceable, read_manifest
 from cavsumo.scenario import plan_from
 from cavsumo.setting import Setting, differences, manifest, prepare
@@ -55,6 +56,7 @@ def checked(parts: Sequence[Part], output: Path, manner: Manner) -> list[Checked
     """Check all parts of a run before any is played; raises InputError in one sentence."""
     batches = [_checked(part, part.output(output), manner) for part in parts]
     for batch in batches:
+        check_free(batch.output)
         if batch.recorded is None and not manner.overwrite:
             check_replaceable(batch.output)
     return batches

@@ -237,6 +237,12 @@ class Recorder:
 _FRAME = ("format", "status", "columns")  # what the recorder itself adds to a manifest
 
 
+def check_free(csv_file: Path) -> None:
+    """Raise ResultsError if another run is writing these results; changes nothing."""
+    if csv_file.is_file():
+        _locked(csv_file).close()
+
+
 def _locked(file: Path) -> FileIO:
     """A file opened for writing, created if need be and locked until it is closed."""
     try:

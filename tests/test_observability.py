@@ -11,16 +11,17 @@ from support import rows, traces
 
 from cavsumo.agents import AGENTS, Agent
 from cavsumo.cli import main
+from cavsumo.config import read_config
 from cavsumo.errors import InputError, UnknownName
 from cavsumo.jobs import episode_seed, job, make_agents
-from cavsumo.outcomes import frame
-from cavsumo.scenario import BatchPlan, plan_from, read_config
+from cavsumo.scenario import BatchPlan, plan_from
 from cavsumo.sensors import Sensor
 from cavsumo.simulator import Performance, play
 from cavsumo.site import Site
 from cavsumo.snapshot import Snapshot
 from cavsumo.stage import set_stage
 from cavsumo.theatre import Theatre
+from cavsumo.traces import frame
 
 Staged = Callable[..., tuple[BatchPlan, Site]]
 Writer = Callable[..., str]

@@ -123,7 +123,7 @@ def _ratios(report: Report) -> Iterator[Plot]:
         bars = []
         for one in found[:LINES]:
             where = [word for word in (one.setting, one.agent) if word]
-            name = " · ".join((*where, f"{one.first or '(none)'} : {one.second or '(none)'}"))
+            name = words.JOINT.join((*where, f"{one.first or '(none)'} : {one.second or '(none)'}"))
             bars.append(ratio_bar(name, one, _ratio(one)))
         if bars:
             title = f"{what.capitalize()}: how many times as often"

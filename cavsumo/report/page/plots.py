@@ -21,6 +21,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
 from cavsumo.report.compare import Comparison
+from cavsumo.report.page.words import JOINT
 from cavsumo.report.rates import Share
 from cavsumo.report.survival import Curve
 
@@ -179,10 +180,11 @@ def _plain(axes: Axes) -> None:
 
 
 def _short(names: Sequence[str]) -> list[str]:
-    """Names as short lines, to stand beside an axis: without what all begin with, cut inside."""
-    letters = os.path.commonprefix(names) if len(names) > 1 else ""  # noqa: RUF071  # letters meant
+    """Names as short lines, to stand beside an axis: files without what all begin with."""
+    files = {name.partition(JOINT)[0] for name in names if JOINT in name}
+    letters = os.path.commonprefix(list(files)) if len(files) > 1 else ""  # noqa: RUF071  # letters
     begin = max(letters.rfind(mark) for mark in "-_/") + 1
-    return [_cut(name[begin:].replace(".csv", "")) for name in names]
+    return [_cut(name[begin:].replace(".csv" + JOINT, JOINT)) for name in names]
 
 
 def _cut(text: str) -> str:

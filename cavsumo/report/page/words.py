@@ -17,6 +17,7 @@ from cavsumo.summary import interval, percent
 ANSWERS = 12  # groups that are told in a sentence each
 ERRORS = 5  # that are quoted
 BATCHES = 6  # results that are told in full
+JOINT = " · "  # between a file, an agent and a value in a name
 Facts = list[tuple[str, str]]
 
 
@@ -42,12 +43,12 @@ def headline(report: Report) -> str:
 def label(told: Told, by: str) -> str:
     """A group in a word or two."""
     words = [told.agent] if by == "agent" else [told.agent, f"{by} {told.value or '(none)'}"]
-    return " · ".join([*([told.setting] if told.setting else []), *words])
+    return JOINT.join([*([told.setting] if told.setting else []), *words])
 
 
 def _who(told: Told, by: str) -> str:
     """A group as the subject of a sentence."""
-    return label(told, by).replace(" · ", ": ", 1) if told.setting else label(told, by)
+    return label(told, by).replace(JOINT, ": ", 1) if told.setting else label(told, by)
 
 
 def answers(report: Report) -> list[str]:
