@@ -7,13 +7,12 @@ from __future__ import annotations
 
 from typing import Any
 
-CONTRACTS = ("AgentContract", "AssertionContract", "EgoContract")
-__all__ = ["AgentContract", "AssertionContract", "EgoContract"]  # made when asked for
+__all__ = ["AgentContract", "AssertionContract", "EgoContract"]
 
 
 def __getattr__(name: str) -> Any:
     """One of the classes."""
-    if name not in CONTRACTS:
+    if name not in __all__:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
     from cavsumo.testing import contracts
 
