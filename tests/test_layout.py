@@ -57,7 +57,8 @@ ORDER = """
     report.formats report.junit
     report.page.scenes report.page.words report.page.plots report.page.places report.page.links
     report.page.document report.page
-    testing.scripts testing.ego_checks testing.agent_checks testing.assertion_checks testing
+    testing.scripts testing.ego_checks testing.agent_checks testing.assertion_checks
+    testing.contracts testing
     commands commands.run commands.replay commands.merge commands.report commands.inspect
     commands.import_osm commands.check_ego commands.game
     cli_settings cli_egos cli_networks cli_results cli_games cli __main__
@@ -139,3 +140,8 @@ def test_the_command_line_starts_light() -> None:
 def test_the_process_that_waits_has_no_sumo() -> None:
     """SUMO may take its process down, so the parent, which keeps the results, never loads it."""
     assert "libsumo" not in loaded_by("cavsumo.session, cavsumo.commands.run")
+
+
+def test_an_ego_is_checked_without_pytest() -> None:
+    """Who installs cavsumo alone has the command too."""
+    assert "pytest" not in loaded_by("cavsumo.commands.check_ego")

@@ -12,11 +12,18 @@ from pathlib import Path
 
 import pytest
 
+from cavsumo.checked import Manner, checked
+from cavsumo.cli import _parser
+from cavsumo.cli_settings import parts_of
+
 ROOT = Path(__file__).resolve().parents[1]
 FILES = ("README.md", "docs/guide.md")
 README = "\n".join((ROOT / file).read_text(encoding="utf-8") for file in FILES)
 REPORTS = sorted(set(re.findall(r"^cavsumo report [^`\n]*", README, re.MULTILINE)))
 COMMANDS = sorted(set(re.findall(r"cavsumo run [^`\n]*", README)))
+FIRST = (ROOT / "README.md").read_text(encoding="utf-8")
+AGAIN = ("--help", "--resume", "--retry-errors")
+PLAYED = [c for c in COMMANDS if c in FIRST or set(AGAIN) & set(c.split())]
 
 
 def cavsumo(words: list[str], folder: Path) -> subprocess.CompletedProcess[str]:
@@ -46,7 +53,7 @@ def checkout(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
-@pytest.mark.parametrize("command", COMMANDS)
+@pytest.mark.parametrize("command", PLAYED)
 def test_each_run_command_of_the_readme_runs(command: str, checkout: Path) -> None:
     """Whatever the README tells the reader to type plays episodes."""
     words = shlex.split(command, comments=True)[1:]
@@ -54,11 +61,22 @@ def test_each_run_command_of_the_readme_runs(command: str, checkout: Path) -> No
         pytest.skip("there is no cluster of that name; tests/test_executors.py has one")
     if "tcp:127.0.0.1:5000" in words:
         pytest.skip("nobody listens there; tests/test_external_egos.py has the server")
-    if not {"--help", "--resume", "--retry-errors"} & set(words):
+    if not set(AGAIN) & set(words):
         words += ["--runs", "1", "-o", "readme.csv"]
     done = cavsumo(words, checkout)
     assert done.returncode in (0, 1), done.stderr
     assert "Traceback" not in done.stderr
+
+
+@pytest.mark.parametrize("command", [c for c in COMMANDS if c not in PLAYED])
+def test_each_run_command_of_the_guide_is_valid(
+    command: str, checkout: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Its options are accepted, its agents and egos made, and its network has room for the test."""
+    monkeypatch.chdir(checkout)
+    monkeypatch.syspath_prepend(str(checkout))
+    options = _parser().parse_args(shlex.split(command, comments=True)[1:])
+    assert checked(parts_of(options), Path("guide.csv"), Manner())
 
 
 @pytest.mark.parametrize("command", REPORTS)

@@ -12,10 +12,9 @@ import numpy as np
 from cavsumo.agents.base import Agent
 from cavsumo.bodies import Action
 from cavsumo.egos.base import EGO_KIND
-from cavsumo.kinematics import step_floats
 from cavsumo.scene import Scene
 from cavsumo.snapshot import BodyState, Snapshot
-from cavsumo.testing.scripts import CROWDED, EMPTY, ODD, Ground, Script
+from cavsumo.testing.scripts import CROWDED, EMPTY, ODD, Ground, Script, driven
 
 MakeAgent = Callable[[], Agent]
 Check = Callable[[MakeAgent, Ground], str]
@@ -151,8 +150,5 @@ def _moved(states: tuple[BodyState, ...], joint: Joint, dt: float) -> tuple[Body
     """The bodies after a timestep."""
     moved = list(states)
     for i, action in zip(OWNED, joint, strict=True):
-        body, x, y, v, o = states[i]
-        kind = body.kind
-        limits = kind.wheelbase, kind.v_min, kind.v_max
-        moved[i] = BodyState(body, *step_floats(x, y, v, o, *action, *limits, dt))
+        moved[i] = driven(states[i], action, dt)
     return tuple(moved)

@@ -13,7 +13,7 @@ from pathlib import Path
 
 import numpy as np
 
-from cavsumo.bodies import BICYCLE, BUS, CAR, PEDESTRIAN, Body, Kind
+from cavsumo.bodies import BICYCLE, BUS, CAR, PEDESTRIAN, Action, Body, Kind
 from cavsumo.egos.base import Acceleration, Command, Drive, Ego, Mission
 from cavsumo.kinematics import step_floats
 from cavsumo.scene import Scene
@@ -134,7 +134,7 @@ def drive(
         if script.held:
             continue
         if isinstance(command, Drive):
-            state, steering = _driven(state, command, scene.dt), command.steering
+            state, steering = driven(state, command, scene.dt), command.steering
             along = scene.ego_path.project(state.x, state.y).along
         else:
             along += state.v * scene.dt
@@ -156,11 +156,12 @@ def _speed(state: BodyState, command: Command, dt: float) -> float:
     return min(kind.v_max, max(kind.v_min, state.v + a * dt))
 
 
-def _driven(state: BodyState, command: Drive, dt: float) -> BodyState:
-    """An ego that steers itself, after a timestep."""
-    kind = state.body.kind
+def driven(state: BodyState, action: Action | Drive, dt: float) -> BodyState:
+    """A body after a timestep in which its effectors did something."""
+    (body, x, y, v, o), (throttle, steering) = state, action
+    kind = body.kind
     limits = kind.wheelbase, kind.v_min, kind.v_max
-    return BodyState(state.body, *step_floats(*state[1:], *command, *limits, dt))
+    return BodyState(body, *step_floats(x, y, v, o, throttle, steering, *limits, dt))
 
 
 def _lights(scene: Scene, step: int) -> tuple[str, ...]:
