@@ -2,9 +2,9 @@
 
 Of the ego and the testers, pedestrians too, until the first contact between them. The snapshots are
 kept while the episode goes on and measured once, at its end. An exact time to collision costs ten
-times as much as one of the circles around two bodies, which it is never below: so these come first,
-and the boxes only of those that could still be the most critical. Of two tracks only parts near each
-other are compared. ``metrics`` has the same for arrays, without bounds.
+times as much as one of the circles around two bodies, which it is never below: so these come
+first, and the boxes only of those that could still be the most critical. Of two tracks only parts
+near each other are compared. ``metrics`` has the same for arrays, without bounds.
 """
 
 from __future__ import annotations
