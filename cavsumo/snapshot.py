@@ -54,7 +54,7 @@ class Snapshot(NamedTuple):
         unseen: ids of the ego and of testers whom a tester agent does not see through its sensor
             (``sensors``): they are shown where it last saw them. None without such a sensor.
         crossing_lights: what each of ``Scene.crossings`` shows who walks over it, empty for one
-            without lights; for whoever judges, no observer is shown it.
+            without lights. Sensors leave it out.
     """
 
     step: int
