@@ -126,7 +126,7 @@ def test_what_a_light_shows_is_seen(open_world: Opener, staged: Staged) -> None:
         world.reset(3, (), (), everything=False)
         following = world.step((), None)
         assert following is not None
-        assert following.lights == ()
+        assert len(following.lights) == 1  # blame wants them, whoever else looks
 
 
 def test_any_leaves_the_lights_alone(staged: Staged) -> None:
