@@ -27,6 +27,7 @@ ORDER = """
     network ego_routes lane_chains approaches starts vehicle_starts kerbs signals trips traffic
     route_rules scene site sight sensors
     osm handedness netconvert facts surfaces inspection layers picture
+    abstraction.coordinates abstraction
     agents.base agents.walking agents.driving agents.triggers agents.random agents.features
     agents.manoeuvres agents.behaviours agents.programmed agents.election agents.qlearning agents
     observations policies agents.policy
