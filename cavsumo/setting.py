@@ -74,6 +74,8 @@ def prepare(plan: BatchPlan, ego: Ego | None = None) -> Setting:
     """
     scenario = plan.scenario
     check_agents(plan)
+    for label in plan.cast:
+        make_agents(plan, label)[0].prepare()
     make_assertions(
         scenario.assertions, scenario.assertion_params, scenario.formulas, scenario.step_length
     )

@@ -5,6 +5,7 @@ Importing this package registers the agents that come with cavsumo.
 
 from cavsumo.agents import (  # noqa: F401  (imported to be registered)
     election,
+    expectiminimax,
     programmed,
     qlearning,
     random,

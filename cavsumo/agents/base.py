@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Any, ClassVar
+from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 
@@ -11,6 +11,24 @@ from cavsumo.bodies import NOOP, Action, Kind
 from cavsumo.registry import Registry
 from cavsumo.scene import Scene
 from cavsumo.snapshot import BodyState, Snapshot
+
+SURE, UNDECIDED, NOT_FORCEABLE = "sure", "undecided", "not-forceable"
+
+
+class Forecast(NamedTuple):
+    """What an agent says of an episode before it is played.
+
+    Attributes:
+        verdict: SURE, UNDECIDED or NOT_FORCEABLE: whether it brings about a test.
+        value: of its game where the episode starts: 0 for a test, -1 for none.
+    """
+
+    verdict: str
+    value: float
+
+    def rank(self) -> tuple[int, float]:
+        """The larger, the better for the tester."""
+        return -(SURE, UNDECIDED, NOT_FORCEABLE).index(self.verdict), self.value
 
 
 class Agent:
@@ -28,6 +46,7 @@ class Agent:
     learns: bool = False  # whether episodes change what it knows: then they are played in sequence
     sees_background: bool = True
     drives: bool = True
+    promise: str = ""  # against whom its forecasts hold; empty for agents that make none
 
     scene: Scene
     owned: tuple[int, ...]
@@ -36,12 +55,22 @@ class Agent:
     def check_bodies(self, kind: Kind, bodies: int) -> None:
         """Raise ValueError unless the agent can own so many bodies of a kind."""
 
+    def prepare(self) -> None:
+        """Do once what would take long in an episode; called before any, in every process."""
+
     def reset(self, scene: Scene, owned: Sequence[int], rng: np.random.Generator) -> None:
         """Begin an episode with the bodies ``scene.bodies[i] for i in owned``.
 
         The generator belongs to this agent for this episode; nobody else draws from it.
         """
         self.scene, self.owned, self.rng = scene, tuple(owned), rng
+
+    def forecast(self, snapshot: Snapshot) -> Forecast | None:
+        """Whether this episode brings about a test; called once, between reset and the first action.
+
+        None for agents that do not know.
+        """
+        return None
 
     def choose_action(self, snapshot: Snapshot) -> tuple[Action, ...]:
         """An action for each owned body, in their order (seed, ChooseAction)."""
