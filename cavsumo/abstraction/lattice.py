@@ -108,7 +108,6 @@ def _standing(rules: Rules) -> Steps:
 
 def _walking(rules: Rules) -> Steps:
     """A body on its way to the strip."""
-    gaps, speeds, lefts, paces = rules.shape
     axes = [np.arange(n) for n in rules.shape]
     gap, speed, left, pace = np.meshgrid(*axes, indexing="ij")
     found = [_walk(rules, gap, speed, left, pace, change) for change in (-1, 1)]
@@ -120,7 +119,7 @@ def _walking(rules: Rules) -> Steps:
 
 def _walk(rules: Rules, gap: Array, speed: Array, left: Array, pace: Array, change: int) -> Steps:
     """One action of the tester: the change of its pace."""
-    gaps, speeds, lefts, paces = rules.shape
+    gaps, speeds, _, paces = rules.shape
     after = np.clip(pace + change, 0, paces - 1)
     next_left = left - (pace + after)
     next_gap, next_speed, accel = _ego(rules, gap, speed)
@@ -158,6 +157,6 @@ def _entry(rules: Rules, left: Array, pace: Array, after: Array) -> Array:
 
 def _number(rules: Rules, gap: Array, speed: Array, left: Array, pace: Array) -> Array:
     """The number of a walking state, of those alone; anything for what is none."""
-    gaps, speeds, lefts, paces = rules.shape
+    _, speeds, lefts, paces = rules.shape
     gap, left = np.clip(gap, 0, None), np.clip(left, 0, None)
     return ((gap * speeds + speed) * lefts + left[..., None]) * paces + pace[..., None]

@@ -35,8 +35,8 @@ class Solved:
     """
 
     rules: Rules
-    sure: memoryview
-    value: memoryview
+    sure: memoryview[int]
+    value: memoryview[float]
 
     def surely(self, gap: float, v: float, left: float, walk: float) -> bool:
         """Whether the goal is sure at the corner of the cell that is worst for the tester.
@@ -105,7 +105,8 @@ def solved(rules: Rules) -> Solved:
     if found is None:
         found = _solve(rules)
         _write(_file(rules), found)
-    return Solved(rules, memoryview(found[8 * size :]), memoryview(found[: 8 * size]).cast("d"))
+    values: memoryview[float] = memoryview(found[: 8 * size]).cast("d")
+    return Solved(rules, memoryview(found[8 * size :]), values)
 
 
 def _solve(rules: Rules) -> bytes:
@@ -156,6 +157,6 @@ def _write(file: Path | None, body: bytes) -> None:
             try:
                 stream.write(hashlib.sha256(body).digest() + body)
                 stream.close()
-                os.replace(stream.name, file)
+                Path(stream.name).replace(file)
             except OSError:
-                os.unlink(stream.name)
+                Path(stream.name).unlink()

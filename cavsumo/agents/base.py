@@ -12,7 +12,7 @@ from cavsumo.registry import Registry
 from cavsumo.scene import Scene
 from cavsumo.snapshot import BodyState, Snapshot
 
-SURE, UNDECIDED, NOT_FORCEABLE = "sure", "undecided", "not-forceable"
+VERDICTS = SURE, UNDECIDED, NOT_FORCEABLE = "sure", "undecided", "not-forceable"
 
 
 class Forecast(NamedTuple):
@@ -28,7 +28,7 @@ class Forecast(NamedTuple):
 
     def rank(self) -> tuple[int, float]:
         """The larger, the better for the tester."""
-        return -(SURE, UNDECIDED, NOT_FORCEABLE).index(self.verdict), self.value
+        return -VERDICTS.index(self.verdict), self.value
 
 
 class Agent:
@@ -66,7 +66,7 @@ class Agent:
         self.scene, self.owned, self.rng = scene, tuple(owned), rng
 
     def forecast(self, snapshot: Snapshot) -> Forecast | None:
-        """Whether this episode brings about a test; called once, between reset and the first action.
+        """Whether this episode brings about a test; called once, before the first action.
 
         None for agents that do not know.
         """

@@ -26,8 +26,9 @@ from cavsumo.scene import Scene
 from cavsumo.snapshot import Snapshot
 
 NEAR_M, FAR_M = 3.0, 6.0  # how far from the strip the tables begin: of free and of constant egos
-# Ways that are tried at once where the straight one takes too long, off the way across [degrees].
-ESCAPES = tuple(sign * turn for turn in range(5, 75, 5) for sign in (1, -1))
+# Ways that are tried at once where the straight one takes too long, off the way across [rad].
+ESCAPES = tuple(math.radians(sign * turn) for turn in range(5, 75, 5) for sign in (1, -1))
+TURNING_S = 0.5  # no more is gained by turning less at first
 
 
 @AGENTS.register("expectiminimax")
@@ -48,7 +49,7 @@ class ExpectiminimaxAgent(Agent):
 
     def __init__(
         self,
-        against: str = "unaware",
+        against: str = "constant",
         price_per_s: float = 0.01,
         grid_s: float = 0.05,
         top: float = 13.89,
@@ -125,12 +126,30 @@ class ExpectiminimaxAgent(Agent):
         """The verdict of episodes played in the head; the way that succeeds is the one taken."""
         scene = self.scene
         for n, i in enumerate(self.owned):
-            for escape in (None, *ESCAPES):
-                turn = None if escape is None else math.radians(escape)
+            for turn in (None, *self._escapes(snapshot, i)):
                 if succeeds(scene, snapshot, Tactic(scene, i, self._outlooks[i], turn)):
                     self._lead(n, turn)
                     return SURE
         return NOT_FORCEABLE
+
+    def _escapes(self, snapshot: Snapshot, index: int) -> tuple[float, ...]:
+        """Oblique ways worth trying [rad]: none where the straight one is late by more than the
+        best of them gains.
+
+        On a way at phi to the straight one a body at speed w gains d tan(phi) of the ego's way and
+        loses d (1 / cos(phi) - 1) / w of its time: at best d / w (1 - sqrt(1 - (w / v)^2)).
+        """
+        outlook, here = self._outlooks[index][-1], Coordinates(self.scene, index)(snapshot)
+        if here is None or here.left <= 0.0 or here.gap <= 0.0:
+            return ()
+        w, v = outlook.kind.v_max, here.v
+        if v > w:
+            gain = here.left / w * (1.0 - math.sqrt(1.0 - (w / v) ** 2))
+            t, _, _ = outlook.walked(here, 0.0)
+            late = t - here.gap / v + 0.5 * v / outlook.max_decel
+            if late > gain + TURNING_S:
+                return ()
+        return ESCAPES
 
     def _lead(self, n: int, escape: float | None) -> None:
         """Let one body play alone as long as it can come to a test."""

@@ -2,7 +2,8 @@
 
 It goes to the kerb and waits there as long as it can go later just as surely: late tests leave the
 ego less time to react, and least of the road is used. Once on the road it walks on, or stands
-while going on would spoil the test. In the ego's way it stands.
+while going on would spoil the test. In the ego's way it stands, until the ego has
+passed or has stopped; then it goes on to the other side.
 """
 
 from __future__ import annotations
@@ -11,7 +12,7 @@ import math
 from collections.abc import Sequence
 
 from cavsumo.abstraction.coordinates import Coordinates, Relative
-from cavsumo.abstraction.outlook import Outlook
+from cavsumo.abstraction.outlook import LEAST_MPS, Outlook
 from cavsumo.agents.walking import ApproachKerb, walk
 from cavsumo.bodies import Action
 from cavsumo.kinematics import step_floats
@@ -82,9 +83,12 @@ class Tactic:
         """What it does from then on."""
         state, here, dt = snapshot.testers[self.index], self.where(snapshot), self.scene.dt
         met = self.where.meeting
-        assert here is not None and met is not None
+        assert here is not None
+        assert met is not None
         heading, top = met.way.heading, state.body.kind.v_max
-        if here.gap < self._passed:  # on, off the road
+        over = here.left < -met.width
+        # An ego that stands is of no class: waiting for it could go on for ever.
+        if over or here.gap < self._passed or here.v <= LEAST_MPS:
             there = met.way.progress(state.x, state.y) >= met.way.length
             return walk(state, heading, 0.0 if there else top, dt)
         if self.escape is not None:

@@ -13,6 +13,7 @@ from cavsumo.egos import make_ego
 from cavsumo.errors import CavsumoError, Exit, InputError
 from cavsumo.executors import Means, opened
 from cavsumo.interrupts import Interrupts
+from cavsumo.jobs import make_agents
 from cavsumo.recorder import Recorder
 from cavsumo.session import Session
 from cavsumo.setting import Setting
@@ -76,6 +77,7 @@ def _play(
         sequential=looks_at_rows(setting.plan),
         shared=setting.plan.reset == "shared",
         cut_short=session.cut_short or session.status == "interrupted",
+        promises={n: make_agents(setting.plan, n)[0].promise for n in setting.plan.cast},
     )
 
 
