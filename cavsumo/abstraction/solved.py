@@ -43,8 +43,7 @@ class Solved:
 
         Units are those of the rules; an ego faster than those of the lattice is never sure.
         """
-        cell = self._cell(gap, v, left, walk)
-        i, j, k, m = cell
+        i, j, k, m = self._cell(gap, v, left, walk)
         return self._sure(
             math.floor(i + SNAP), math.ceil(j - SNAP), math.ceil(k - SNAP), math.floor(m + SNAP)
         )
@@ -52,6 +51,9 @@ class Solved:
     def possibly(self, gap: float, v: float, left: float, walk: float) -> bool:
         """Whether it is sure at the best corner; if not, it can be forced from nowhere around."""
         i, j, k, m = self._cell(gap, v, left, walk)
+        if k < SNAP:  # that corner is at the strip: only the zones matter, which never recede
+            decel = self.rules.max_decel
+            return gap > (0.5 * v * v / decel if decel else 0.0)
         j = min(j, float(self.rules.speeds - 1))
         return self._sure(
             math.ceil(i - SNAP),
