@@ -30,7 +30,7 @@ def played(networks: dict[str, Path], tmp_path_factory: pytest.TempPathFactory) 
     """Episodes with one pedestrian on the straight road."""
     file = tmp_path_factory.mktemp("expectiminimax") / "one.csv"
     words = ["run", "-n", str(networks["pedestrians"]), *CONSTANT, *PLAIN, "--testers", "1"]
-    assert main([*words, "--runs", "12", "-o", str(file), "-q"]) == 0
+    assert main([*words, "--runs", "9", "-o", str(file), "-q"]) == 0
     return file
 
 
@@ -46,10 +46,10 @@ def test_the_summary_says_what_it_promised(
     """With the class of egos, and beside the tests that came out; two at a time change nothing."""
     file = tmp_path / "one.csv"
     words = ["run", "-n", str(networks["pedestrians"]), *CONSTANT, *PLAIN, "--testers", "1"]
-    assert main([*words, "--runs", "12", "-o", str(file), "-j", "2"]) == 0
+    assert main([*words, "--runs", "9", "-o", str(file), "-j", "2"]) == 0
     sure = sum(row["forecast"] == SURE for row in rows(played))
     assert (
-        f"expectiminimax: of 12 starts {sure} are sure, 0 undecided, {12 - sure} not forceable "
+        f"expectiminimax: of 9 starts {sure} are sure, 0 undecided, {9 - sure} not forceable "
         f"against egos of class constant; tests in {sure}, 0 and 0 of them"
     ) in capsys.readouterr().out
     assert rows(file) == rows(played)
@@ -69,7 +69,7 @@ def test_two_bodies_are_one_agent(networks: dict[str, Path], tmp_path: Path) -> 
     """One of them goes and the other stays out of the way, so no sure test is spoilt."""
     file = tmp_path / "pair.csv"
     words = ["run", "-n", str(networks["pedestrians"]), *CONSTANT, *PLAIN]
-    teams = ["--testers", "2", "--bodies-per-agent", "2", "--runs", "8"]
+    teams = ["--testers", "2", "--bodies-per-agent", "2", "--runs", "6"]
     assert main([*words, *teams, "-o", str(file), "-q"]) == 0
     for row in rows(file):
         assert (row["forecast"] == SURE) == (row["outcome"] == "violated"), row
@@ -83,7 +83,7 @@ def test_it_plays_against_drivers_too(
     file = tmp_path / "driver.csv"
     words = ["run", "-n", str(networks["crossing"]), "--agent", "expectiminimax", *PLAIN]
     params = ["--param", f"against={against}", "--param", "top=9", "--testers", "2"]
-    assert main([*words, *params, "--runs", "2", "-o", str(file), "-q"]) == 0
+    assert main([*words, *params, "--runs", "1", "-o", str(file), "-q"]) == 0
     assert all(row["outcome"] != "error" and row["forecast"] for row in rows(file))
 
 
