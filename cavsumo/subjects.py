@@ -153,7 +153,7 @@ def _known_before(record: Record) -> Memory | None:
     plan, label = record.plan, record.row["agent"]
     if label not in learners(plan):
         return (plan.known or {}).get(label)
-    if record.trace is not None and record.trace.head["memory_kept"]:
+    if record.trace is not None and record.trace.head.get("memory_kept"):
         memory = record.trace.head["memory"]
         return None if memory is None else tuple(memory)
     with Worker(prepare(plan)) as worker:

@@ -200,13 +200,6 @@ def test_seeds_are_none_of_those_used() -> None:
     assert of.isdisjoint(number % SUMO_SEEDS for number in taken)
 
 
-class Everything(set[int]):
-    """All numbers."""
-
-    def isdisjoint(self, other: Any) -> bool:
-        return False
-
-
 def test_seeds_that_run_out_are_said(monkeypatch: pytest.MonkeyPatch) -> None:
     """There is an end to the search."""
     monkeypatch.setattr("cavsumo.seeds._sumo_seeds", lambda seed, runs: [0])
