@@ -11,6 +11,7 @@ import sys
 import time
 from pathlib import Path
 
+import pytest
 from support import rows
 
 from cavsumo.results import read_manifest
@@ -55,6 +56,7 @@ def playing(parent: int, folder: Path) -> list[int]:
     return found
 
 
+@pytest.mark.slow
 def test_a_batch_survives_whatever_happens_to_its_processes(
     networks: dict[str, Path], tmp_path: Path
 ) -> None:
