@@ -109,7 +109,8 @@ def wishes(plan: BatchPlan, kind: Kind, ego: Ego) -> Wishes:
     scenario = plan.scenario
     volume = None
     if scenario.traffic is not None:
-        volume = Volume(*scenario.traffic, duration=scenario.end + BEYOND_S, seed=plan.seed)
+        seed = plan.seed if scenario.traffic_seed is None else scenario.traffic_seed
+        volume = Volume(*scenario.traffic, duration=scenario.end + BEYOND_S, seed=seed)
     return Wishes(
         kind=kind,
         types=scenario.approaches or _types(plan),

@@ -21,6 +21,7 @@ from cavsumo.contacts import ContactMonitor
 from cavsumo.criticality import Course
 from cavsumo.egos.base import Drive, Ego
 from cavsumo.errors import AgentError
+from cavsumo.jobs import starts_generator
 from cavsumo.kinematics import step_floats
 from cavsumo.rewards import Feedback, Ledger
 from cavsumo.roads import Start
@@ -224,7 +225,8 @@ def _reset(
 ) -> tuple[Scene, Snapshot, Senses | None]:
     """Draw the starts and begin an episode; one generator for each who draws."""
     streams = np.random.SeedSequence(seed)
-    placing, electing, *rest = map(np.random.default_rng, streams.spawn(2 + len(agents)))
+    _, electing, *rest = map(np.random.default_rng, streams.spawn(2 + len(agents)))
+    placing = starts_generator(seed if stage.starts_seed is None else stage.starts_seed)
     kinds = [body.kind for body in stage.bodies]
     ego = stage.world.ego_body
     starts = stage.site.draw(kinds, ego.kind, stage.start_speed, placing)

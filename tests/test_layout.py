@@ -31,7 +31,7 @@ ORDER = """
     abstraction.solved abstraction.outlook abstraction
     agents.base agents.walking agents.driving agents.triggers agents.random agents.features
     agents.manoeuvres agents.behaviours agents.programmed agents.election agents.qlearning
-    agents.tactics agents.rehearsal agents.expectiminimax agents
+    agents.tactics agents.rehearsal agents.expectiminimax agents.recorded agents
     observations policies agents.policy
     ego_observations
     contacts conduct criticality
@@ -53,7 +53,7 @@ ORDER = """
     envs.spaces envs.puppets envs.settings envs.events envs.episodes envs.elsewhere_process
     envs.elsewhere envs.painting envs.base envs.tester envs.ego envs.parallel envs.discrete envs
     statistics tally stopping results recorder learning progress session checked
-    summary interrupts replays listings fcd gui
+    summary interrupts replays seeds subjects opponents certificate listings fcd gui
     pages.shell pages player.packing player.curves player.scenery player.facts player.page player
     report report.load report.grouping report.rates report.pairs report.compare report.survival
     report.effort report.events report.distinct report.analysis report.tables report.figures
@@ -63,8 +63,9 @@ ORDER = """
     testing.scripts testing.ego_checks testing.agent_checks testing.assertion_checks
     testing.contracts testing
     commands commands.run commands.replay commands.merge commands.report commands.inspect
-    commands.import_osm commands.check_ego commands.game
-    cli_settings cli_egos cli_networks cli_results cli_games cli __main__
+    commands.import_osm commands.check_ego commands.game commands.certify
+    cli_settings cli_egos cli_networks cli_results cli_games cli_certify
+    cli __main__
 """.split()
 
 HEAVY = {"numpy", "pandas", "scipy", "shapely", "libsumo", "sumolib", "pydantic", "rich"}

@@ -9,6 +9,7 @@ from cavsumo.agents import (  # noqa: F401  (imported to be registered)
     programmed,
     qlearning,
     random,
+    recorded,
 )
 from cavsumo.agents.base import AGENTS, Agent
 from cavsumo.scene import Scene
