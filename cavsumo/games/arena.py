@@ -19,6 +19,7 @@ import numpy.typing as npt
 from cavsumo.games.model import Bools, Floats, Game, Ints
 from cavsumo.games.readings import Reading
 from cavsumo.games.regions import spans
+from cavsumo.games.rises import rises
 
 BLOCK = 128  # states that are swept at a time, at least
 
@@ -46,6 +47,7 @@ class Arena:
         successor: of each outcome, m for goals, int32.
         probability: of each outcome.
         reward: of each cell.
+        fast: whether compiled loops are used.
     """
 
     reading: Reading
@@ -57,6 +59,7 @@ class Arena:
     successor: npt.NDArray[np.int32]
     probability: Floats
     reward: Floats
+    fast: bool
 
     @property
     def size(self) -> int:
@@ -72,6 +75,16 @@ class Arena:
     def group_state(self) -> Ints:
         """The state of each group."""
         return np.repeat(np.arange(self.size), np.diff(self.state_group))
+
+    @cached_property
+    def cell_state(self) -> Ints:
+        """The state of each cell."""
+        return self.group_state[self.cell_group]
+
+    def rises(self, value: Floats) -> Floats:
+        """r + sum of p V(s') - V(s) of every cell."""
+        parts = (self.cell_outcome, self.successor, self.probability, self.reward, self.cell_state)
+        return rises(*parts, value, self.fast)[0]
 
     @cached_property
     def matrix(self) -> Any:
@@ -109,18 +122,33 @@ def arena(game: Game, reading: Reading, live: Ints, kept: Bools | None = None) -
         group_size, state_size = group_size[some], np.bincount(state, minlength=len(live))
     number = np.full(game.n_states, len(live), dtype=np.int32)
     number[live] = np.arange(len(live))
-    outcome = spans(game.outcome_start, cells)
+    begin, successor, probability = _gathered(game, cells, number)
     return Arena(
         Reading.C if ego_first else Reading.A,
         live,
         cells,
         _starts(state_size),
         _starts(group_size),
-        _starts(np.diff(game.outcome_start)[cells]),
-        number[game.successor[outcome]],
-        game.probability[outcome],
+        begin,
+        successor,
+        probability,
         game.reward[cells],
+        game.fast,
     )
+
+
+def _gathered(game: Game, cells: Ints, number: Any) -> tuple[Ints, Any, Floats]:
+    """The outcomes of these cells: where each cell's begin, successors by number, probabilities."""
+    if game.fast:
+        from cavsumo.games.compiled import graphs
+
+        found: tuple[Ints, Any, Floats]
+        parts = (game.outcome_start, cells, number, game.successor, game.probability)
+        found = graphs.gathered(*parts)
+        return found
+    outcome = spans(game.outcome_start, cells)
+    begin = _starts(game.outcome_start[cells + 1] - game.outcome_start[cells])
+    return begin, number[game.successor[outcome]], game.probability[outcome]
 
 
 def _starts(sizes: Ints) -> Ints:

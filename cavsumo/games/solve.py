@@ -23,10 +23,10 @@ from typing import Any
 import numpy as np
 
 from cavsumo.errors import CavsumoError
-from cavsumo.games.certificate import Certificate, holds, rises
-from cavsumo.games.components import EPSILON
+from cavsumo.games.certificate import Certificate, holds, rises_of
 from cavsumo.games.flow import best_order
 from cavsumo.games.model import Bools, Floats, Game
+from cavsumo.games.pairs import coarseness
 from cavsumo.games.plays import Play, play_of, time_of, value_of
 from cavsumo.games.readings import Reading
 from cavsumo.games.regions import keeping
@@ -149,7 +149,7 @@ def _start(game: Game, verdict: Verdict, play: Play, tell: Tell) -> Floats:
     if verdict.reading is Reading.B:
         return value
     first = play_of(game, verdict.reading, play.arena.states, verdict.proper.moves)
-    value, *_ = _approach(first, value, 0.0, 0.1 * scale, "a first policy", tell, jumps=8)
+    value, *_ = _approach(first, value, 0.0 * value, 0.1 * scale, "a first policy", tell, jumps=8)
     return value
 
 
@@ -158,13 +158,15 @@ def _certified(
 ) -> Certificate:
     """Bounds that hold, as close as was asked for if floats allow it."""
     scale = float(np.abs(play.arena.reward).max(initial=0.0)) or 1.0
-    value, pair, _ = _approach(play, value, 0.0, 1e-4 * scale, "the value", tell)
+    value, pair, left = _approach(play, value, 0.0 * value, 1e-4 * scale, "the value", tell)
     time = time_of(play, pair)
     steps = np.append(np.ones(play.arena.size), 0.0) if time is None else time
+    noise = _noise(game, verdict.reading, play, value, left)
     best, e = None, precision / (3.0 * float(steps.max()))
     for _ in range(ATTEMPTS):
-        e = max(e, _coarseness(game, play, value))
-        found = _bounds(game, verdict, play, value, steps, e, tell)
+        e = max(e, 1.25 * coarseness(value))
+        found = _bounds(game, verdict, play, value, pair, steps, e, noise, tell)
+        tell("checking the bounds", np.inf)
         width = _width(found) if holds(game, found) else np.inf
         if width <= precision:
             return found
@@ -184,12 +186,23 @@ def _width(found: Certificate) -> float:
     return float((found.upper[inside] - found.lower[inside]).max(initial=0.0))
 
 
-def _coarseness(game: Game, play: Play, value: Floats) -> float:
-    """The least e for which bounds can be found and proven: some units of the last place."""
+def _noise(game: Game, reading: Reading, play: Play, value: Floats, left: float) -> Floats:
+    """For each state how far rounding may take a rise that ought to be 0, with room to spare.
+
+    Most cells that matter lead to states of nearly the same value; only those that do not, such as
+    an accident that throws far back, need more room than a unit of the last place.
+    """
     whole = np.zeros(game.n_states)
     whole[play.arena.states] = value[:-1]
-    _, error = rises(game, whole)
-    return 4.0 * float(error.max(initial=0.0)) + 24.0 * EPSILON * float(np.abs(value).max())
+    rise, error = rises_of(game, whole)
+    error *= 4.0
+    near = np.abs(rise) <= 2.0 * (error + left)
+    if reading is Reading.B:  # rises cancel in a mixture
+        near[:] = True
+        error += 24.0 * coarseness(value)
+    most = np.zeros(game.n_states)
+    np.maximum.at(most, game.cell_state, np.where(near, error, 0.0))
+    return np.append(most[play.arena.states], 0.0)
 
 
 def _bounds(
@@ -197,13 +210,21 @@ def _bounds(
     verdict: Verdict,
     play: Play,
     value: Floats,
+    pair: Any,
     steps: Floats,
     e: float,
+    noise: Floats,
     tell: Tell,
 ) -> Certificate:
-    """The solutions of the game with rewards lowered and raised by e."""
-    low, low_pair, _ = _approach(play, value - e * steps, -e, 0.5 * e, "lower bound", tell)
-    high, high_pair, _ = _approach(play, low + 2.0 * e * steps, e, 0.5 * e, "upper bound", tell)
+    """The solutions of the game with rewards lowered and raised by e and some noise."""
+    shift = np.append(np.maximum(e, noise[:-1]), 0.0)
+    residual = max(0.5 * e, min(0.8 * e, coarseness(value)))
+    low, low_pair, _ = _approach(
+        play, value - e * steps, -shift, residual, "lower bound", tell, before=pair
+    )
+    high, high_pair, _ = _approach(
+        play, low + 2.0 * e * steps, shift, residual, "upper bound", tell, before=low_pair
+    )
     lower, upper = (np.where(verdict.proper.inside, 0.0, -np.inf) for _ in range(2))
     lower[play.arena.states], upper[play.arena.states] = low[:-1], high[:-1]
     return Certificate(
@@ -218,33 +239,36 @@ def _bounds(
 def _approach(
     play: Play,
     value: Floats,
-    shift: float,
+    shift: Floats,
     residual: float,
     doing: str,
     tell: Tell,
+    *,
+    before: Any = None,
     jumps: int = JUMPS,
 ) -> tuple[Floats, Any, float]:
     """V with |T V + shift - V| <= residual if it can be had, the pair that attains T V, the rest.
 
-    Returns the best V that was met.
+    ``before`` is the pair that V is nearly the value of, if one is known. Returns the best V that
+    was met.
     """
-    sweeps, before, stuck = play.sweeps, None, 0
+    sweeps, stuck = play.sweeps, 0
     best: tuple[Floats, Any, float] = (value, None, np.inf)
     for _ in range(jumps):
-        backed_up, pair = play.backup(value)
-        backed_up[:-1] += shift
-        left = float(np.abs(backed_up - value).max())
+        rise, pair = play.backup(value)
+        rise += shift
+        left = float(np.abs(rise).max())
         tell(doing, left)
         stuck = 0 if left < 0.5 * best[2] else stuck + 1
         if left < best[2] or best[1] is None:
             best = (value.copy(), pair, left)
         if left <= residual or (stuck > 6 and left <= 3.0 * residual):
             break
-        jump = value_of(play, pair, backed_up, shift, 0.25 * residual, _same(pair, before))
+        jump = value_of(play, pair, value, shift, 0.25 * residual, _same(pair, before))
         before = pair
         if jump is None or stuck > 15:
             sweeps, stuck = min(SWEEPS, max(1, 2 * sweeps)), 0
-        value = backed_up if jump is None else jump
+        value = value + rise if jump is None else jump
         if jump is None or left > NEAR * residual:  # a sweep adds up rounding errors on its way
             for _ in range(sweeps):
                 play.sweep(value, shift)
