@@ -17,8 +17,8 @@ import numpy as np
 import numpy.typing as npt
 
 from cavsumo.games.model import Bools, Floats, Game, Ints
+from cavsumo.games.parts import spans, starts
 from cavsumo.games.readings import Reading
-from cavsumo.games.regions import spans
 from cavsumo.games.rises import rises
 
 BLOCK = 128  # states that are swept at a time, at least
@@ -109,8 +109,8 @@ def arena(game: Game, reading: Reading, live: Ints, kept: Bools | None = None) -
         order, start, groups = game.replies
     else:
         order, start, groups = np.arange(game.n_cells), game.cell_start, game.row_start
-    group = spans(groups, live)
-    place = spans(start, group)
+    group = spans(groups, live, game.fast)
+    place = spans(start, group, game.fast)
     group_size, state_size = np.diff(start)[group], np.diff(groups)[live]
     cells = order[place]
     if kept is not None:
@@ -127,8 +127,8 @@ def arena(game: Game, reading: Reading, live: Ints, kept: Bools | None = None) -
         Reading.C if ego_first else Reading.A,
         live,
         cells,
-        _starts(state_size),
-        _starts(group_size),
+        starts(state_size),
+        starts(group_size),
         begin,
         successor,
         probability,
@@ -147,12 +147,8 @@ def _gathered(game: Game, cells: Ints, number: Any) -> tuple[Ints, Any, Floats]:
         found = graphs.gathered(*parts)
         return found
     outcome = spans(game.outcome_start, cells)
-    begin = _starts(game.outcome_start[cells + 1] - game.outcome_start[cells])
+    begin = starts(game.outcome_start[cells + 1] - game.outcome_start[cells])
     return begin, number[game.successor[outcome]], game.probability[outcome]
-
-
-def _starts(sizes: Ints) -> Ints:
-    return np.concatenate(([0], np.cumsum(sizes)))
 
 
 def _block(a: Arena, first: int, last: int) -> Block:

@@ -10,6 +10,7 @@ import numpy as np
 
 from cavsumo.games.arena import Arena, Block
 from cavsumo.games.model import Floats, Ints
+from cavsumo.games.parts import firsts
 from cavsumo.games.readings import Reading
 
 
@@ -43,8 +44,8 @@ def backup(arena: Arena, value: Floats) -> tuple[Floats, Ints]:
     rise = arena.rises(value)
     answer = inner.reduceat(rise, arena.group_cell[:-1])
     best = outer.reduceat(answer, arena.state_group[:-1])
-    group = _first(answer == best[arena.group_state], arena.state_group)
-    cell = _first(rise == answer[arena.cell_group], arena.group_cell)
+    group = firsts(np.flatnonzero(answer == best[arena.group_state]), arena.group_state)
+    cell = firsts(np.flatnonzero(rise == answer[arena.cell_group]), arena.cell_group)
     return np.append(best, 0.0), cell[group]
 
 
@@ -53,10 +54,4 @@ def answers(arena: Arena, value: Floats) -> Ints:
     _, inner = _operators(arena)
     rise = arena.rises(value)
     best = inner.reduceat(rise, arena.group_cell[:-1])
-    return _first(rise == best[arena.cell_group], arena.group_cell)
-
-
-def _first(true: np.ndarray, start: Ints) -> Ints:
-    """The place of the first true entry of each part; every part has one."""
-    places = np.flatnonzero(true)
-    return places[np.searchsorted(places, start[:-1])]
+    return firsts(np.flatnonzero(rise == best[arena.cell_group]), arena.cell_group)

@@ -107,6 +107,11 @@ def rises_of(game: Game, value: Floats) -> tuple[Floats, Floats]:
 
 def _mixed(weights: Floats, gain: Floats, start: Ints) -> Floats:
     """Sums of weights times gains over the parts, lowered by what rounding may have added."""
+    used = np.flatnonzero(weights)
+    if len(used) == len(start) - 1 and (weights[used] == 1.0).all():
+        in_turn = (start[:-1] <= used) & (used < start[1:])
+        if in_turn.all():  # one in each part
+            return gain[used]
     product = np.where(weights > 0, weights * gain, 0.0)
     total = np.add.reduceat(product, start[:-1])
     room = (np.diff(start) + 4) * EPSILON * np.add.reduceat(np.abs(product), start[:-1])
@@ -139,7 +144,7 @@ def _policies(game: Game, certificate: Certificate, kept: Bools) -> bool:
         good &= _one(np.add.reduceat(tester[order], start[:-1])[inside[state]])
     if reading is Reading.A:
         rows = kept[game.cell_start[:-1]]
-        good &= bool(np.isin(tester, (0.0, 1.0)).all())
+        good &= bool(((tester == 0.0) | (tester == 1.0)).all())
         good &= _one(np.add.reduceat(ego, game.cell_start[:-1])[rows])
     return bool(good)
 

@@ -13,8 +13,9 @@ from typing import Any
 import numpy as np
 
 from cavsumo.games.model import Bools, Game, Ints
+from cavsumo.games.parts import firsts
 
-SWEEPS = 3
+SWEEPS = 2
 WORTH_IT = 2000  # states from which a choice is made
 
 
@@ -33,13 +34,10 @@ def _one_move(game: Game, moves: Bools) -> Any:
     """Transitions between states under the first move of each, none from goals."""
     from scipy.sparse import csr_matrix
 
-    cells = np.flatnonzero(moves)
-    state = game.cell_state[cells]
-    first = np.ones(len(cells), dtype=bool)
-    first[1:] = state[1:] != state[:-1]
-    part = game.matrix[cells[first]]
+    cells = firsts(np.flatnonzero(moves), game.cell_state)
+    part = game.matrix[cells]
     start = np.zeros(game.n_states + 1, dtype=part.indptr.dtype)
-    start[state[first] + 1] = np.diff(part.indptr)
+    start[game.cell_state[cells] + 1] = np.diff(part.indptr)
     square = (game.n_states, game.n_states)
     return csr_matrix((part.data, part.indices, np.cumsum(start, dtype=start.dtype)), shape=square)
 

@@ -16,8 +16,8 @@ from cavsumo.games.arena import Arena, arena
 from cavsumo.games.matrix_games import solve
 from cavsumo.games.model import Bools, Floats, Game, Ints
 from cavsumo.games.pairs import pair_value
+from cavsumo.games.parts import spans, starts
 from cavsumo.games.readings import Reading
-from cavsumo.games.regions import spans
 
 
 class Play(Protocol):
@@ -135,7 +135,7 @@ class Simultaneous:
         self._order = np.lexsort((game.ego_action, game.cell_row))
         a = self.arena
         many = np.diff(a.state_group)
-        self._columns = np.concatenate(([0], np.cumsum(np.diff(a.group_cell)[a.state_group[:-1]])))
+        self._columns = starts(np.diff(a.group_cell)[a.state_group[:-1]])
         wide = np.diff(self._columns)
         self._column = np.arange(len(a.cells)) - np.repeat(a.group_cell[:-1], np.diff(a.group_cell))
         self._column += self._columns[a.group_state[a.cell_group]]
@@ -202,7 +202,7 @@ def _sorted(game: Game) -> Game:
     sizes = np.diff(game.outcome_start)[order]
     return dataclasses.replace(
         game,
-        outcome_start=np.concatenate(([0], np.cumsum(sizes))),
+        outcome_start=starts(sizes),
         successor=game.successor[outcome],
         probability=game.probability[outcome],
         reward=game.reward[order],

@@ -23,6 +23,7 @@ from typing import Any
 import numpy as np
 
 from cavsumo.games.model import Bools, Game, Ints
+from cavsumo.games.parts import firsts, spans
 from cavsumo.games.readings import Reading
 
 NEVER = np.iinfo(np.int32).max  # lacking so much, nothing is ever complete
@@ -82,15 +83,6 @@ def keeping(game: Game, reading: Reading, inside: Bools) -> Bools:
     return whole
 
 
-def spans(start: Ints, which: Ints) -> Ints:
-    """The concatenated ranges start[w] : start[w + 1] for each w in ``which``."""
-    begin, length = start[which], start[which + 1] - start[which]
-    ends = np.cumsum(length)
-    total = int(ends[-1]) if len(ends) else 0
-    found: Ints = np.arange(total) + np.repeat(begin - ends + length, length)
-    return found
-
-
 @dataclass(frozen=True)
 class _Level:
     """Cells, groups or states of an attractor.
@@ -126,10 +118,10 @@ def _attract(game: Game, ego_first: bool, allowed: Bools, lacking: Any) -> tuple
     moves = np.zeros(game.n_cells, dtype=bool)
     if ego_first:
         answers = (cells.step == rows.step[group]) & (layer[game.cell_state] > 0)
-        moves[_firsts(order[answers[order]], group)] = True
+        moves[firsts(order[answers[order]], group)] = True
     else:
         chosen = np.zeros(len(state), dtype=bool)
-        chosen[_firsts(np.flatnonzero((rows.step == layer[state]) & (rows.step > 0)), state)] = True
+        chosen[firsts(np.flatnonzero((rows.step == layer[state]) & (rows.step > 0)), state)] = True
         moves = chosen[group]
     return layer.astype(np.int64), moves
 
@@ -143,14 +135,6 @@ def _grouped(game: Game, ego_first: bool) -> tuple[Ints, Ints, Ints]:
 
 def _level(lacking: Ints, whole: Ints) -> _Level:
     return _Level(np.full(len(lacking), -1, np.int32), lacking.astype(np.int32), whole)
-
-
-def _firsts(places: Ints, owner: Ints) -> Ints:
-    """The first place of each owner; places of an owner stand together."""
-    owners = owner[places]
-    first = np.ones(len(places), dtype=bool)
-    first[1:] = owners[1:] != owners[:-1]
-    return places[first]
 
 
 def _spread(game: Game, cells: _Level, groups: _Level, states: _Level) -> None:
@@ -174,7 +158,7 @@ def _completed(level: _Level, parts: Ints, step: int) -> Ints:
     """What the parts that came, each naming what it belongs to, made complete."""
     np.subtract.at(level.lacking, parts, 1)
     found = np.sort(parts[level.lacking[parts] <= 0])
-    found = _firsts(found, np.arange(len(level.step)))
+    found = firsts(found, np.arange(len(level.step)))
     level.step[found] = step
     level.lacking[found] = NEVER
     return found

@@ -35,6 +35,7 @@ from cavsumo.games.solvable import Verdict, solvability
 PRECISION = 1e-6
 JUMPS = 400  # to the value of a pair, at most, in each of the three solutions
 SWEEPS = 512  # between two jumps, at most
+PATIENCE = 4  # jumps in a row that do not halve the residual, before there are more sweeps
 ATTEMPTS = 12  # at a certificate
 NEAR = 100.0  # times the residual wanted, within which there are only jumps
 Tell = Callable[[str, float], None]  # called with what is being done and the residual
@@ -220,10 +221,10 @@ def _bounds(
     shift = np.append(np.maximum(e, noise[:-1]), 0.0)
     residual = max(0.5 * e, min(0.8 * e, coarseness(value)))
     low, low_pair, _ = _approach(
-        play, value - e * steps, -shift, residual, "lower bound", tell, before=pair
+        play, value - e * steps, -shift, residual, "lower bound", tell, near=pair
     )
     high, high_pair, _ = _approach(
-        play, low + 2.0 * e * steps, shift, residual, "upper bound", tell, before=low_pair
+        play, low + 2.0 * e * steps, shift, residual, "upper bound", tell, near=low_pair
     )
     lower, upper = (np.where(verdict.proper.inside, 0.0, -np.inf) for _ in range(2))
     lower[play.arena.states], upper[play.arena.states] = low[:-1], high[:-1]
@@ -244,15 +245,16 @@ def _approach(
     doing: str,
     tell: Tell,
     *,
-    before: Any = None,
+    near: Any = None,
     jumps: int = JUMPS,
 ) -> tuple[Floats, Any, float]:
     """V with |T V + shift - V| <= residual if it can be had, the pair that attains T V, the rest.
 
-    ``before`` is the pair that V is nearly the value of, if one is known. Returns the best V that
+    ``near`` is the pair that V is nearly the value of, if one is known: then there are no sweeps
+    unless jumps do not help, as a sweep adds up rounding errors on its way. Returns the best V that
     was met.
     """
-    sweeps, stuck = play.sweeps, 0
+    sweeps, before, stuck = play.sweeps if near is None else 0, near, 0
     best: tuple[Floats, Any, float] = (value, None, np.inf)
     for _ in range(jumps):
         rise, pair = play.backup(value)
@@ -266,10 +268,10 @@ def _approach(
             break
         jump = value_of(play, pair, value, shift, 0.25 * residual, _same(pair, before))
         before = pair
-        if jump is None or stuck > 15:
+        if jump is None or stuck > PATIENCE:
             sweeps, stuck = min(SWEEPS, max(1, 2 * sweeps)), 0
         value = value + rise if jump is None else jump
-        if jump is None or left > NEAR * residual:  # a sweep adds up rounding errors on its way
+        if jump is None or left > NEAR * residual:
             for _ in range(sweeps):
                 play.sweep(value, shift)
     return best

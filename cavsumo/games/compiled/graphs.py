@@ -1,4 +1,4 @@
-"""Attractors, as in ``regions``, and the choice of cells, as in ``arena``."""
+"""Attractors, as in ``regions``, ranges, as in ``parts``, cells laid out, as in ``arena``."""
 
 from __future__ import annotations
 
@@ -40,6 +40,21 @@ def spread(  # type: ignore[no-untyped-def]
                 layer[t] = step
                 joined[count] = t
                 count += 1
+
+
+@njit(cache=True, nogil=True)
+def spans(start, which):  # type: ignore[no-untyped-def]
+    """The concatenated ranges start[w] : start[w + 1]."""
+    total = 0
+    for w in which:
+        total += start[w + 1] - start[w]
+    found = np.empty(total, dtype=np.int64)
+    i = 0
+    for w in which:
+        for k in range(start[w], start[w + 1]):
+            found[i] = k
+            i += 1
+    return found
 
 
 @njit(cache=True, nogil=True)
