@@ -17,7 +17,7 @@ import numpy as np
 import numpy.typing as npt
 
 from cavsumo.games.model import Bools, Floats, Game, Ints
-from cavsumo.games.parts import spans, starts
+from cavsumo.games.parts import gathered, spans, starts
 from cavsumo.games.readings import Reading
 from cavsumo.games.rises import rises
 
@@ -94,6 +94,16 @@ class Arena:
         parts = (self.probability, self.successor, self.cell_outcome)
         return csr_matrix(parts, shape=(len(self.cells), self.size + 1))
 
+    def transitions(self, cells: Ints) -> Any:
+        """Those of one cell a state, as a square CSR matrix; the last state is the goals'."""
+        from scipy.sparse import csr_matrix
+
+        here = np.arange(self.size + 1, dtype=np.int32)
+        parts = (self.cell_outcome, self.successor, self.probability)
+        start, to, chance = gathered(*parts, cells, here, self.fast)
+        square = (self.size + 1, self.size + 1)
+        return csr_matrix((chance, to, np.append(start, start[-1])), shape=square)
+
     @cached_property
     def blocks(self) -> list[Block]:
         """The states in runs for sweeps."""
@@ -122,7 +132,9 @@ def arena(game: Game, reading: Reading, live: Ints, kept: Bools | None = None) -
         group_size, state_size = group_size[some], np.bincount(state, minlength=len(live))
     number = np.full(game.n_states, len(live), dtype=np.int32)
     number[live] = np.arange(len(live))
-    begin, successor, probability = _gathered(game, cells, number)
+    begin, successor, probability = gathered(
+        game.outcome_start, game.successor, game.probability, cells, number, game.fast
+    )
     return Arena(
         Reading.C if ego_first else Reading.A,
         live,
@@ -135,20 +147,6 @@ def arena(game: Game, reading: Reading, live: Ints, kept: Bools | None = None) -
         game.reward[cells],
         game.fast,
     )
-
-
-def _gathered(game: Game, cells: Ints, number: Any) -> tuple[Ints, Any, Floats]:
-    """The outcomes of these cells: where each cell's begin, successors by number, probabilities."""
-    if game.fast:
-        from cavsumo.games.compiled import graphs
-
-        found: tuple[Ints, Any, Floats]
-        parts = (game.outcome_start, cells, number, game.successor, game.probability)
-        found = graphs.gathered(*parts)
-        return found
-    outcome = spans(game.outcome_start, cells)
-    begin = starts(game.outcome_start[cells + 1] - game.outcome_start[cells])
-    return begin, number[game.successor[outcome]], game.probability[outcome]
 
 
 def _block(a: Arena, first: int, last: int) -> Block:

@@ -8,7 +8,6 @@ A pair that never reaches a goal from somewhere has a singular system: then noth
 from __future__ import annotations
 
 import warnings
-from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -112,35 +111,33 @@ def _factorised(pair: _Pair) -> Any:
 
 
 def _krylov(pair: _Pair) -> Any:
-    from scipy.sparse.linalg import LinearOperator, bicgstab
-
-    p = pair.transitions
-    system = LinearOperator(p.shape, lambda x: x - p @ x)
-    sweep = LinearOperator(p.shape, _forward(pair))
-    norm = 0.3 * np.sqrt(p.shape[0])  # of a vector whose entries are all about 0.3
+    """BiCGSTAB with a Gauss-Seidel sweep as preconditioner."""
+    iterate = _compiled(pair) if pair.fast else _by_scipy(pair)
+    norm = 0.3 * np.sqrt(len(pair.reward))  # of a vector whose entries are all about 0.3
 
     def solve(left: Floats, wanted: float) -> Floats:
-        enough = min(norm * wanted, 0.05 * float(np.linalg.norm(left)))
-        found: Floats
-        found, _ = bicgstab(system, left, rtol=0.0, atol=enough, maxiter=ITERATIONS, M=sweep)
+        found: Floats = iterate(left, min(norm * wanted, 0.05 * float(np.sqrt((left**2).sum()))))
         return found
 
     return solve
 
 
-def _forward(pair: _Pair) -> Callable[[Floats], Floats]:
-    """One Gauss-Seidel sweep from 0: the lower triangle of I - P, inverted."""
-    from scipy.sparse import tril
-    from scipy.sparse.linalg import splu
-
-    if not pair.fast:
-        triangle = tril(pair.system, format="csc")
-        factors = splu(triangle, permc_spec="NATURAL", diag_pivot_thresh=0.0)
-        return lambda x: factors.solve(x)
+def _compiled(pair: _Pair) -> Any:
     from cavsumo.games.compiled import systems
 
     p = pair.transitions
-    leave = 1.0 - p.diagonal()
-    if not (leave > 0).all():
-        raise RuntimeError("a state that is never left")
-    return lambda x: systems.forward(p.indptr, p.indices, p.data, x, leave)
+    return lambda left, enough: systems.bicgstab(
+        p.indptr, p.indices, p.data, left, enough, ITERATIONS
+    )
+
+
+def _by_scipy(pair: _Pair) -> Any:
+    from scipy.sparse import tril
+    from scipy.sparse.linalg import LinearOperator, bicgstab, splu
+
+    triangle = tril(pair.system, format="csc")
+    factors = splu(triangle, permc_spec="NATURAL", diag_pivot_thresh=0.0)
+    sweep = LinearOperator(triangle.shape, factors.solve)
+    return lambda left, enough: bicgstab(
+        pair.system, left, rtol=0.0, atol=enough, maxiter=ITERATIONS, M=sweep
+    )[0]

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
-from cavsumo.games.model import Ints
+from cavsumo.games.model import Floats, Ints
 
 
 def spans(start: Ints, which: Ints, fast: bool = False) -> Ints:
@@ -32,3 +34,18 @@ def firsts(places: Ints, owner: Ints) -> Ints:
     first = np.ones(len(places), dtype=bool)
     first[1:] = owners[1:] != owners[:-1]
     return places[first]
+
+
+def gathered(
+    start: Ints, successor: Any, probability: Floats, cells: Ints, number: Any, fast: bool
+) -> tuple[Ints, Any, Floats]:
+    """The outcomes of some cells: where each cell's begin, successors renumbered, probabilities."""
+    if fast:
+        from cavsumo.games.compiled import graphs
+
+        compiled: tuple[Ints, Any, Floats]
+        compiled = graphs.gathered(start, successor, probability, cells, number)
+        return compiled
+    outcome = spans(start, cells)
+    begin = starts(start[cells + 1] - start[cells])
+    return begin, number[successor[outcome]], probability[outcome]

@@ -91,12 +91,7 @@ class TurnBased:
 
     def system(self, pair: Ints) -> tuple[Any, Floats]:
         """See ``Play``."""
-        from scipy.sparse import csr_matrix
-
-        chosen, size = self.arena.matrix[pair], self.arena.size + 1
-        start = np.append(chosen.indptr, chosen.indptr[-1])
-        square = csr_matrix((chosen.data, chosen.indices, start), shape=(size, size))
-        return square, np.append(self.arena.reward[pair], 0.0)
+        return self.arena.transitions(pair), np.append(self.arena.reward[pair], 0.0)
 
     def tester(self, game: Game, pair: Ints, value: Floats) -> Floats:
         """See ``Play``."""

@@ -104,10 +104,18 @@ def _attract(game: Game, ego_first: bool, allowed: Bools, lacking: Any) -> tuple
     Args:
         lacking: how many outcomes of a cell must lead on; a number, or one for each cell.
     """
-    order, start, groups = _grouped(game, ego_first)
-    group = np.empty(game.n_cells, dtype=np.int64)
-    group[order] = np.repeat(np.arange(len(start) - 1), np.diff(start))
-    state = np.repeat(np.arange(game.n_states), np.diff(groups))
+    if ego_first:
+        order, start, groups = game.replies
+        group = np.empty(game.n_cells, dtype=np.int64)
+        group[order] = np.repeat(np.arange(len(start) - 1), np.diff(start))
+        state = np.repeat(np.arange(game.n_states), np.diff(groups))
+    else:
+        start, groups, group, state = (
+            game.cell_start,
+            game.row_start,
+            game.cell_row,
+            game.row_state,
+        )
     cells = _level(np.where(allowed, lacking, NEVER), group)
     # All cells of some row, or some cell for each action of the ego:
     rows = _level(np.ones_like(state) if ego_first else np.diff(start), state)
@@ -124,13 +132,6 @@ def _attract(game: Game, ego_first: bool, allowed: Bools, lacking: Any) -> tuple
         chosen[firsts(np.flatnonzero((rows.step == layer[state]) & (rows.step > 0)), state)] = True
         moves = chosen[group]
     return layer.astype(np.int64), moves
-
-
-def _grouped(game: Game, ego_first: bool) -> tuple[Ints, Ints, Ints]:
-    """The cells in order of their groups, where groups begin, where the groups of states do."""
-    if ego_first:
-        return game.replies
-    return np.arange(game.n_cells), game.cell_start, game.row_start
 
 
 def _level(lacking: Ints, whole: Ints) -> _Level:

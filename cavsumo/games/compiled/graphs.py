@@ -58,7 +58,7 @@ def spans(start, which):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, nogil=True)
-def gathered(start, which, number, successor, probability):  # type: ignore[no-untyped-def]
+def gathered(start, successor, probability, which, number):  # type: ignore[no-untyped-def]
     """The outcomes of the cells ``which``, successors renumbered, and where each cell's begin."""
     begin = np.zeros(len(which) + 1, dtype=np.int64)
     for i, c in enumerate(which):
