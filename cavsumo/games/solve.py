@@ -1,7 +1,8 @@
 """Expectiminimax values and policies (seed, eq. 3), between certified bounds.
 
 1. Decide whether the game is solvable; refuse it with a witness when it is not.
-2. Start from a proper tester policy, the one by which the almost-sure region was found.
+2. Start from the pair of policies that a few sweeps from V = 0 come to; where that pair does not
+   reach a goal, from a proper tester policy, the one by which the almost-sure region was found.
 3. Repeat: a Gauss-Seidel sweep of the Bellman operator T, then jump to the value of the pair of
    policies that attains it (policy iteration on both players at once). Where a pair has no value
    or nothing improves, more sweeps come between jumps: value iteration converges from anywhere.
@@ -33,6 +34,7 @@ from cavsumo.games.regions import keeping
 from cavsumo.games.solvable import Verdict, solvability
 
 PRECISION = 1e-6
+FIRST_SWEEPS = 4  # from V = 0
 JUMPS = 400  # to the value of a pair, at most, in each of the three solutions
 SWEEPS = 512  # between two jumps, at most
 PATIENCE = 4  # jumps in a row that do not halve the residual, before there are more sweeps
@@ -140,26 +142,37 @@ def _trivial(game: Game, reading: Reading, inside: Bools) -> Certificate:
 
 
 def _start(game: Game, verdict: Verdict, play: Play, tell: Tell) -> Floats:
-    """Nearly the value of the tester policy by which the region was found, against its worst ego.
+    """The value of the pair of policies that a few sweeps come to, where that reaches a goal.
 
-    In reading B: of the policy that mixes all moves by which states joined, against an ego that
-    mixes all of its own.
+    Else nearly the value of the tester policy by which the region was found, against its worst ego.
+    In reading B: 0.
     """
-    scale = float(np.abs(play.arena.reward).max(initial=0.0)) or 1.0
     value = np.zeros(play.arena.size + 1)
     if verdict.reading is Reading.B:
         return value
+    none, scale = np.zeros_like(value), _scale(play)
+    for _ in range(FIRST_SWEEPS):
+        play.sweep(value, none)
+    _, pair = play.backup(value)
+    jump = value_of(play, pair, value, none, 0.1 * scale, precise=False)
+    if jump is not None:
+        return jump
     first = play_of(game, verdict.reading, play.arena.states, verdict.proper.moves)
-    value, *_ = _approach(first, value, 0.0 * value, 0.1 * scale, "a first policy", tell, jumps=8)
+    value, *_ = _approach(first, none, none, 0.1 * scale, "a first policy", tell, jumps=8)
     return value
+
+
+def _scale(play: Play) -> float:
+    """The size of rewards."""
+    return float(np.abs(play.arena.reward).max(initial=0.0)) or 1.0
 
 
 def _certified(
     game: Game, verdict: Verdict, play: Play, value: Floats, precision: float, tell: Tell
 ) -> Certificate:
     """Bounds that hold, as close as was asked for if floats allow it."""
-    scale = float(np.abs(play.arena.reward).max(initial=0.0)) or 1.0
-    value, pair, left = _approach(play, value, 0.0 * value, 1e-4 * scale, "the value", tell)
+    none = np.zeros_like(value)
+    value, pair, left = _approach(play, value, none, 1e-4 * _scale(play), "the value", tell)
     time = time_of(play, pair)
     steps = np.append(np.ones(play.arena.size), 0.0) if time is None else time
     noise = _noise(game, verdict.reading, play, value, left)
