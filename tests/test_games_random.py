@@ -181,6 +181,23 @@ def test_many_states_are_solved_by_the_iterative_path() -> None:
     assert (found.upper[:-1] < 0).all()
 
 
+def test_bounds_are_close_where_floats_are_coarse() -> None:
+    """2,000 steps and a value of -100,000: a residual of 20 units of its last place is too much.
+
+    Near the end a slip now and then leads back to the beginning.
+    """
+    states, slips = 2000, range(1900, 2000, 10)
+    transitions: list[Any] = []
+    for k in range(states - 1):
+        slip = [(k + 1, "99/100", -50), (0, "1/100", -50)]
+        transitions.append((k, 0, 0, slip if k in slips else [(k + 1, 1, -50)]))
+    game = from_transitions(states, [states - 1], transitions)
+    found = solve(game)
+    assert found.upper[0] < -1e5
+    assert found.precise
+    assert holds_exactly(game, found.certificate)
+
+
 def test_a_first_policy_may_be_terrible() -> None:
     """A ladder on which every slip leads back: 2^-k on the obvious way up, a safe way beside it."""
     rungs = 40

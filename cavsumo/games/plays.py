@@ -60,10 +60,10 @@ def value_of(
 
 
 def time_of(play: Play, pair: Any) -> Floats | None:
-    """The expected number of steps to a goal under a pair, None if it may be infinite."""
+    """Nearly the expected number of steps to a goal under a pair, None if it may be infinite."""
     transitions, _ = play.system(pair)
     ones = np.append(np.ones(play.arena.size), 0.0)
-    found = pair_value(transitions, ones, ones, 1e-3, fast=play.arena.fast)
+    found = pair_value(transitions, ones, ones, 1e-2, fast=play.arena.fast)
     return None if found is None or (found[:-1] < 0.9).any() else found
 
 

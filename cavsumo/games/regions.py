@@ -159,7 +159,7 @@ def _completed(level: _Level, parts: Ints, step: int) -> Ints:
     """What the parts that came, each naming what it belongs to, made complete."""
     np.subtract.at(level.lacking, parts, 1)
     found = np.sort(parts[level.lacking[parts] <= 0])
-    found = firsts(found, np.arange(len(level.step)))
+    found = found[np.diff(found, prepend=-1) > 0]  # each once
     level.step[found] = step
     level.lacking[found] = NEVER
     return found
