@@ -17,9 +17,11 @@ PACKAGE = Path(cavsumo.__file__).parent
 # From the ground up: a module uses only what stands before it, lazily or not.
 ORDER = """
     cavsumo errors checks registry imports processes
-    games.model games.build games.files games.readings games.regions games.components
-    games.solvable games.policies games.chains games.evaluation games.proper games.certificate
-    games.flow games.arena games.kernel games.backups games.matrix_games games.pairs games.plays
+    games.compiled games.compiled.graphs games.compiled.systems
+    games.model games.build games.files games.readings games.parts games.rises games.regions
+    games.components games.solvable games.policies games.chains games.evaluation games.proper
+    games.certificate games.flow games.arena games.compiled.bellman games.backups
+    games.matrix_games games.pairs games.plays
     games.solve games games.drawing games.pictures
     kinematics geometry paths bodies snapshot fairness roads sumo_poses background
     metrics.following metrics.rss metrics.highway_code metrics.zones metrics.plane
