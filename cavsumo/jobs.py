@@ -69,7 +69,11 @@ def agent_files(plan: BatchPlan) -> list[Path]:
             files.append(file)
             continue
         params = plan.agent_params(label, [p.name for p in parameters_of(name)])
-        files += [Path(str(params[key])) for key in getattr(AGENTS.get(name), "FILES", ()) if key in params]
+        files += [
+            Path(str(params[key]))
+            for key in getattr(AGENTS.get(name), "FILES", ())
+            if key in params
+        ]
     return files
 
 

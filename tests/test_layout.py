@@ -27,7 +27,8 @@ ORDER = """
     network ego_routes lane_chains approaches starts vehicle_starts kerbs signals trips traffic
     route_rules scene site sight sensors
     osm handedness netconvert facts surfaces inspection layers picture
-    abstraction.coordinates abstraction.opponent abstraction.response abstraction.solving abstraction
+    abstraction.coordinates abstraction.opponent abstraction.response
+    abstraction.solving abstraction
     agents.base agents.walking agents.driving agents.triggers agents.random agents.features
     agents.manoeuvres agents.behaviours agents.programmed agents.election agents.qlearning
     agents.best_response agents

@@ -1,25 +1,28 @@
-"""A model of the ego, learned by counting: when it changes its acceleration, and what it takes then.
+"""A model of the ego by counting: when it changes its acceleration, and what it takes then.
 
 The ego's transition function is unknown but can be sampled (seed, section 2). Drivers do not decide
-in every timestep: SUMO's hold an acceleration for their ``actionStepLength``. So two things are counted, both
-seen from outside:
+in every timestep: SUMO's hold an acceleration for their ``actionStepLength``. So two things are
+counted, both seen from outside:
 
 * in how many timesteps with an acceleration of age ``held`` it was changed (a hazard), and
 * which acceleration was taken, for each situation: how soon the body enters the strip that the ego
   sweeps, the deceleration needed to stop before it, the ego's speed.
 
 Where little was counted, coarser situations speak: a situation's distribution is its counts plus
-``PSEUDO`` counts of the next coarser one, down to "it keeps its speed".
+``PSEUDO`` counts of the next coarser one (any speed; any entry from the lane; any deceleration
+needed), and last of "it keeps its speed".
 """
 
 from __future__ import annotations
 
 import bisect
-from collections.abc import Mapping, Sequence
+import itertools
+from collections.abc import Iterable, Mapping
 from typing import Any
 
 # Situations. Seconds until the body enters the strip if it goes on; below the first it is inside.
 ENTRY_S = (0.05, 0.25, 0.45, 0.65, 0.85, 1.15)
+ON_THE_LANE = 4  # cells of entry in which the ego's driver sees the body before it, all alike
 NEED_MPS2 = (0.5, 1.5, 3.0, 4.5, 6.5, 9.0)
 SPEED_MPS = (1.0, 3.0, 6.0)
 # Classes of acceleration, and what stands for a class in which nothing was counted [m/s2].
@@ -135,23 +138,25 @@ class Counts:
 
     def chances(self, key: Key) -> list[float]:
         """Probabilities of the classes when it decides in a situation."""
-        entry, need, speed = key
+        entry, need, _ = key
+        near = range(ON_THE_LANE) if entry < ON_THE_LANE else range(entry, entry + 1)
+        one, any_need, any_speed = [entry], range(len(NEED_MPS2) + 1), range(len(SPEED_MPS) + 1)
         chances = [float(which == KEEPS) for which in range(len(MIDDLES_MPS2))]
-        for coarse in ((entry, None, None), (entry, need, None), key):
-            counts = self._pooled(coarse)
+        for group in (
+            itertools.product(near, any_need, any_speed),
+            itertools.product(near, [need], any_speed),
+            itertools.product(one, [need], any_speed),
+            [key],
+        ):
+            counts = self._pooled(group)
             n = sum(counts) + PSEUDO
             chances = [(c + PSEUDO * p) / n for c, p in zip(counts, chances, strict=True)]
         return chances
 
-    def _pooled(self, wanted: Sequence[int | None]) -> list[int]:
-        """The counts of all situations that agree where something is wanted."""
-        if None not in wanted:
-            return self.taken.get(tuple(wanted), [0] * len(MIDDLES_MPS2))  # type: ignore[arg-type]
-        total = [0] * len(MIDDLES_MPS2)
-        for key, counts in self.taken.items():
-            if all(w is None or w == k for w, k in zip(wanted, key, strict=True)):
-                total = [t + c for t, c in zip(total, counts, strict=True)]
-        return total
+    def _pooled(self, keys: Iterable[Key]) -> list[int]:
+        """The counts of some situations together."""
+        rows = [self.taken[key] for key in keys if key in self.taken]
+        return [sum(column) for column in zip(*rows, strict=True)] or [0] * len(MIDDLES_MPS2)
 
     def floor(self, key: Key, confidence: float) -> list[float]:
         """Lower bounds that hold for all classes of a situation together (Clopper-Pearson).
@@ -161,7 +166,7 @@ class Counts:
         """
         from scipy.stats import beta
 
-        counts = self._pooled(key)
+        counts = self._pooled([key])
         n, risk = sum(counts), (1.0 - confidence) / len(counts)
         return [float(beta.ppf(risk, k, n - k + 1)) if k else 0.0 for k in counts]
 

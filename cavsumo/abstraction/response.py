@@ -44,7 +44,7 @@ Ints = NDArray[np.int64]
 MAX_DECEL, REACTION_TIME = 9.0, 0.675  # of the zones aimed at, as in the reaction-zone assertion
 SLOWEST_MPS = 2.2  # below this speed the reaction zone is measured as at this speed
 BEFORE_S, INSIDE_S = 1.4, 1.2  # how long before and after the entry the grid reaches
-COMMITTED_S = 0.5  # a body at full speed cannot stop before the strip any more
+COMMITTED_S = 0.8  # from here on the body walks: it could hardly stop any more
 SPEEDS = np.array([0.0, 1.5, 3.5, 5.5, 8.0, 11.0, 14.0])  # m/s
 ZETAS = np.linspace(-0.9, 2.7, 13)
 CERTAIN = 0.9  # an acceleration whose hazard is above this gets no older in the model
@@ -52,7 +52,7 @@ CERTAIN_NOT = 0.01  # a hazard below this is none
 NEGLIGIBLE = 1e-3  # branches less likely than this are left out
 BACK_PRICE = 0.01  # of a timestep back, which turns take longer than the model knows
 PATIENCE_S = 10.0  # a tester that waits is disturbed once in so long, on average
-PRECISION = 5e-3
+PRECISION = 1e-2
 CLASSES = len(MIDDLES_MPS2)
 STAND, WALK, BACK = 0, 1, 2
 PACE = np.array([0.0, 1.0, -1.0])  # how much each action shortens the time to the entry
@@ -84,7 +84,7 @@ class Aim:
     """
 
     violation: bool = True
-    prices: Prices = Prices()
+    prices: Prices = field(default_factory=Prices)
     confidence: float | None = None
 
 
@@ -192,9 +192,7 @@ class States(NamedTuple):
 def situations(states: States, dt: float) -> tuple[Ints, Ints, Ints]:
     """The cells of ``opponent.situation``, for arrays."""
     gap = states.gap
-    need = np.where(
-        gap > 0.05, states.v**2 / (2.0 * np.maximum(gap, 0.05)), NEED_MPS2[-1] + 1.0
-    )
+    need = np.where(gap > 0.05, states.v**2 / (2.0 * np.maximum(gap, 0.05)), NEED_MPS2[-1] + 1.0)
     return (
         np.searchsorted(ENTRY_S, states.entry * dt, side="right"),
         np.searchsorted(NEED_MPS2, need, side="right"),
@@ -350,9 +348,7 @@ class Plan:
                 takes[:, k] = self._later(states, action, taken, anew, np.full(len(action), k))
         return Backup(decides, chances, keeps, takes)
 
-    def _later(
-        self, states: States, action: Ints, a: Floats, held: Ints, which: Ints
-    ) -> Floats:
+    def _later(self, states: States, action: Ints, a: Floats, held: Ints, which: Ints) -> Floats:
         moved = move(states, action, a, held, self.grid, self.aim)
         places, weights = corners(moved.states, which, self.grid)
         later = (self.value[places] * weights).sum(axis=0)

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
 from cavsumo.abstraction.opponent import Counts
 from cavsumo.abstraction.response import (
     BACK,
     CLASSES,
+    NEGLIGIBLE,
     PRECISION,
     SPEEDS,
     STAND,
@@ -30,22 +33,74 @@ from cavsumo.abstraction.response import (
 )
 from cavsumo.games import Game, from_arrays, solve
 
-
+ROLLOUTS = 40
 MOVES = (STAND, WALK, BACK)  # while the body can still stop
 
 
 def best_response(counts: Counts, dt: float, aim: Aim) -> Plan:
     """Solve against the counted ego; ``dt`` is the timestep of the model [s]."""
+    plan = unsolved(counts, dt, aim)
+    grid = plan.grid
+    if aim.confidence is None:
+        roll_out(plan)
+    else:
+        chain(plan)
+    first = (grid.committed + 1 + grid.inside) * grid.layer
+    plan.value[first:] = solve(response_game(plan), precision=PRECISION).lower[:-1]
+    return plan
+
+
+def unsolved(counts: Counts, dt: float, aim: Aim) -> Plan:
+    """The plan for counts, all values 0."""
     grid = grid_for(counts, dt)
-    plan = Plan(grid, aim, counted(counts, grid, aim.confidence), np.zeros(grid.size))
+    return Plan(grid, aim, counted(counts, grid, aim.confidence), np.zeros(grid.size))
+
+
+def chain(plan: Plan) -> None:
+    """Back up the values of the body that cannot stop any more, from the strip to the kerb.
+
+    The grid blurs what the ego does in the strip; for sets of egos there is nothing better.
+    """
+    grid = plan.grid
     for entry in range(-grid.inside, grid.committed + 1):
         states, which = layer(grid, entry)
         action = np.full(len(which), WALK)
         backup = plan.back_up(states, action, plan.model.middles[which], which)
         plan.value[_slice(grid, entry)] = backup.worth
-    first = (grid.committed + 1 + grid.inside) * grid.layer
-    plan.value[first:] = solve(response_game(plan), precision=PRECISION).lower[:-1]
-    return plan
+
+
+def roll_out(plan: Plan) -> None:
+    """Values of the body that cannot stop any more by simulation, which no grid blurs.
+
+    Of the last two entries only, as no decision leads beyond them. The standard error of a value is
+    at most half the largest price by the root of ROLLOUTS; always the same random numbers.
+    """
+    for entry in (plan.grid.committed - 1, plan.grid.committed):
+        states, which = layer(plan.grid, entry)
+        rng = np.random.default_rng(0)
+        worth = sum(_played(plan, states, which, rng) for _ in range(ROLLOUTS)) / ROLLOUTS
+        plan.value[_slice(plan.grid, entry)] = worth
+
+
+def _played(plan: Plan, states: States, which: Ints, rng: np.random.Generator) -> Floats:
+    """What one walk into the strip earned from each state; all meet the same luck."""
+    grid, model = plan.grid, plan.model
+    worth, left, alive = np.zeros(len(which)), np.ones(len(which)), np.arange(len(which))
+    a = model.middles[which]
+    for _ in range(int(states.entry[0]) + grid.inside + 1):
+        decides, chances = deciding(states, model, grid.dt)
+        anew = rng.random() < decides
+        drawn = (rng.random() > np.cumsum(chances, axis=1)).sum(axis=1).clip(max=CLASSES - 1)
+        a, held = np.where(anew, model.middles[drawn], a), np.where(anew, 0, states.held + 1)
+        moved = move(states, np.full(len(alive), WALK), a, held, grid, plan.aim)
+        worth[alive] -= left * moved.price
+        left = left * (1.0 - moved.over)
+        some = left > NEGLIGIBLE
+        alive, a, left = alive[some], a[some], left[some]
+        states = _some(moved.states, some)
+        if not len(alive):
+            break
+    return worth
 
 
 def _slice(grid: Grid, entry: int) -> slice:
@@ -73,9 +128,14 @@ def response_game(plan: Plan) -> Game:
     grid = plan.grid
     first = grid.committed + 1
     layers = [layer(grid, entry) for entry in range(first, grid.before + 1)]
-    states = States(*(np.concatenate(column) for column in zip(*(s for s, _ in layers), strict=True)))
+    states = States(
+        np.concatenate([s.entry for s, _ in layers]),
+        np.concatenate([s.gap for s, _ in layers]),
+        np.concatenate([s.v for s, _ in layers]),
+        np.concatenate([s.held for s, _ in layers]),
+    )
     which = np.concatenate([w for _, w in layers])
-    rows = States(*(np.repeat(column, len(MOVES)) for column in states))
+    rows = _some(states, np.repeat(np.arange(len(which)), len(MOVES)))
     action = np.tile(MOVES, len(which))
     cell_row, weights = _cells(rows, plan.model, grid.dt)
     outcomes, price = csr_matrix((len(cell_row), len(which) + 1)), np.zeros(len(cell_row))
@@ -104,7 +164,7 @@ def response_game(plan: Plan) -> Game:
     )
 
 
-def _some(states: States, places: Ints) -> States:
+def _some(states: States, places: Any) -> States:
     """Some of the states."""
     return States(*(column[places] for column in states))
 

@@ -36,6 +36,7 @@ from cavsumo.agents.triggers import Timing, time_to_walk
 from cavsumo.agents.walking import ApproachKerb, CrossingWalk, walk
 from cavsumo.bodies import NOOP, Action, Kind
 from cavsumo.checks import choice, number, truth
+from cavsumo.kinematics import wrap
 from cavsumo.scene import Scene
 from cavsumo.snapshot import BodyState, Snapshot
 
@@ -44,6 +45,7 @@ AIMS = ("violation", "test")
 EXPLORED_AIMS = (0.3, 1.3)  # how far into the reaction zone walks that explore step
 INDIFFERENT = 0.02  # a move is kept unless another is worth more by this
 OFF_THE_LANE_S = 1.1  # who stands no nearer stops nobody
+SLOW_MPS = 0.5  # who goes back brakes to this speed before turning
 KNOWN = "best-response"
 
 
@@ -156,7 +158,11 @@ class BestResponseAgent(Agent):
         worst, need = (math.inf, math.inf), 0.0
         for coordinates in self.coordinates:
             here = coordinates(snapshot)
-            if here is None or here.gap < 0.0 or here.left < -coordinates.kind.length - self.scene.ego.kind.width:
+            if (
+                here is None
+                or here.gap < 0.0
+                or here.left < -coordinates.kind.length - self.scene.ego.kind.width
+            ):
                 continue
             entry = entry_time(coordinates.kind, here, self.scene.dt)
             if entry < 1.15 and here.v / (here.gap + 0.05) >= need:
@@ -198,10 +204,16 @@ class Pupil:
             return self.crossing.action(state) if self.begun else self.waiting.action(state)
         if move == WALK:
             return self.crossing.action(state)
-        if move == STAND or self.crossing.crossing is None:
+        brakes = move == STAND or (state.v > SLOW_MPS and not self._faces_back(state))
+        if brakes or self.crossing.crossing is None:
             return walk(state, state.o, 0.0, self.scene.dt)
         back = self.crossing.crossing.heading + math.pi
         return walk(state, back, state.body.kind.v_max, self.scene.dt)
+
+    def _faces_back(self, state: BodyState) -> bool:
+        """Whether it has turned away from the road that it set out to cross."""
+        way = self.crossing.crossing
+        return way is not None and abs(wrap(way.heading - state.o)) > math.pi / 2
 
     def _move(self, snapshot: Snapshot, state: BodyState) -> int:
         """STAND, WALK or BACK."""
@@ -217,10 +229,18 @@ class Pupil:
         plan, kind = self.agent.plan, self.coordinates.kind
         assert plan is not None
         entry = entry_time(kind, here, self.scene.dt) / plan.grid.dt
-        braking_m = here.walk * (here.walk / (-2.0 * kind.throttle_min) + self.scene.dt)
-        if here.left <= braking_m and abs(here.turn) < 1.0:
-            return WALK  # it cannot stop any more
+        if entry <= plan.grid.committed:
+            return self._committed(here, kind)
         return self._best(plan, here, entry)
+
+    def _committed(self, here: Relative, kind: Kind) -> int:
+        """Nearer than decisions are planned: what was begun is brought to its end."""
+        if not self.begun:
+            return STAND
+        room = here.walk * (here.walk / (-2.0 * kind.throttle_min) + self.scene.dt)
+        if self.last == WALK or (here.left <= room and abs(here.turn) < math.pi / 2):
+            return WALK
+        return BACK
 
     def _best(self, plan: Plan, here: Relative, entry: float) -> int:
         """The move that is worth most. Farther away the ages shift along."""

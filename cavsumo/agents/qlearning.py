@@ -159,4 +159,3 @@ def load_weights(file: Path) -> list[float]:
     if not all(math.isfinite(w) for w in weights):
         raise ValueError(f"weights {str(file)!r}: every weight must be finite")
     return weights
-
