@@ -70,9 +70,20 @@ def make_agents(plan: BatchPlan, label: str) -> list[Agent]:
     return [make_agent(name, params) for _ in teams(plan.scenario)]
 
 
-def policy_files(plan: BatchPlan) -> list[Path]:
-    """The files of the agents that are policies."""
-    return [file for name in plan.cast.values() if (file := policy_file(name)) is not None]
+def agent_files(plan: BatchPlan) -> list[Path]:
+    """The files of the agents: those that are policies, and those that their parameters name."""
+    files = []
+    for label, name in plan.cast.items():
+        if (file := policy_file(name)) is not None:
+            files.append(file)
+            continue
+        params = plan.agent_params(label, [p.name for p in parameters_of(name)])
+        files += [
+            Path(str(params[key]))
+            for key in getattr(AGENTS.get(name), "FILES", ())
+            if key in params
+        ]
+    return files
 
 
 def learners(plan: BatchPlan) -> frozenset[str]:

@@ -24,7 +24,7 @@ from cavsumo.egos import make_ego
 from cavsumo.egos.base import Ego
 from cavsumo.egos.specs import ego_files
 from cavsumo.errors import InputError
-from cavsumo.jobs import check_agents, learners, make_agents, policy_files
+from cavsumo.jobs import agent_files, check_agents, learners, make_agents
 from cavsumo.options import OPTIONS
 from cavsumo.scenario import BatchPlan
 from cavsumo.signals import Pace
@@ -156,7 +156,7 @@ def checksums(plan: BatchPlan) -> dict[str, str]:
     """The SHA-256 of every file that a plan names, those of its ego and assertions among them."""
     scenario = plan.scenario
     files = [scenario.net, *([scenario.routes] if scenario.routes else []), *scenario.additional]
-    files += [*policy_files(plan), *ego_files(scenario.ego)]
+    files += [*agent_files(plan), *ego_files(scenario.ego)]
     files += assertion_files(scenario.assertions)
     return {str(file): checksum(file) for file in files}
 

@@ -30,10 +30,12 @@ ORDER = """
     route_rules scene site sight sensors
     osm handedness netconvert facts surfaces inspection layers picture
     abstraction.coordinates abstraction.classes abstraction.rules abstraction.lattice
-    abstraction.solved abstraction.outlook abstraction
+    abstraction.solved abstraction.outlook abstraction.opponent abstraction.response
+    abstraction.solving abstraction
     agents.base agents.walking agents.driving agents.triggers agents.random agents.features
     agents.manoeuvres agents.behaviours agents.programmed agents.election agents.qlearning
-    agents.tactics agents.rehearsal agents.expectiminimax agents.recorded agents
+    agents.tactics agents.rehearsal agents.expectiminimax agents.best_response agents.recorded
+    agents
     observations policies agents.policy
     ego_observations
     contacts conduct criticality

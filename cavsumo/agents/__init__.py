@@ -4,6 +4,7 @@ Importing this package registers the agents that come with cavsumo.
 """
 
 from cavsumo.agents import (  # noqa: F401  (imported to be registered)
+    best_response,
     election,
     expectiminimax,
     programmed,

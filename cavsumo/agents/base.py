@@ -40,9 +40,11 @@ class Agent:
         sees_background: whether it looks at the background traffic. Set False where it does not:
             when nobody in an episode does, far bodies are left out of the snapshots.
         drives: whether its bodies may be vehicles. Set False where it can only walk.
+        FILES: its parameters that name files; their checksums are noted with the results.
     """
 
     PARAMETERS: ClassVar[Mapping[str, str]] = {}
+    FILES: ClassVar[tuple[str, ...]] = ()
     learns: bool = False  # whether episodes change what it knows: then they are played in sequence
     sees_background: bool = True
     drives: bool = True
@@ -114,3 +116,10 @@ class NoopAgent(Agent):
     """Does nothing: its bodies keep their speed and direction (the seed's noop)."""
 
     sees_background = False
+
+
+def learner_of(learned: Mapping[str, Any], name: str) -> Any:
+    """What the learner of a batch knows, by its manifest: that without a label, or the only one."""
+    if name not in learned and len(learned) == 1:
+        return next(iter(learned.values()))
+    return learned[name]

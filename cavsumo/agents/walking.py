@@ -137,13 +137,13 @@ class Stroll:
 
 
 class ApproachKerb:
-    """Go straight to the kerb and wait there, facing the road."""
+    """Go straight to the kerb and wait there, facing the road, at a distance from it [m]."""
 
-    def __init__(self, scene: Scene, index: int) -> None:
+    def __init__(self, scene: Scene, index: int, clearance: float = KERB_CLEARANCE_M) -> None:
         self.dt = scene.dt
         self.way = scene.way(index)
         kind = scene.bodies[index].kind
-        self.stop = (self.way.enter if self.way else 0.0) - kind.length / 2 - KERB_CLEARANCE_M
+        self.stop = (self.way.enter if self.way else 0.0) - kind.length / 2 - clearance
         self.turning = False
         self._last: tuple[BodyState, Action] | None = None
 
