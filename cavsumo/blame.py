@@ -21,6 +21,7 @@ from cavsumo.contacts import STANDING_MPS
 from cavsumo.fairness import is_vehicle
 from cavsumo.metrics.highway_code import DECEL, MPH, THINKING_S
 from cavsumo.metrics.rss import rss_longitudinal, rss_longitudinal_opposite
+from cavsumo.roads import MarkedCrossing
 from cavsumo.scene import Scene
 from cavsumo.snapshot import BodyState, Snapshot
 
@@ -145,15 +146,58 @@ def _safe(snapshot: Snapshot, other: Relation) -> float:
     return float(rss_longitudinal(v, max(0.0, other.onward), RHO_S, ACCEL, B_MIN, B_MAX))
 
 
+def walked_at_red(case: Case) -> float | None:
+    """Somebody on foot stepped out onto a crossing at lights that showed red to it (rule 21).
+
+    The crossing is that on which the body came into the ego's way. Who began there, or stepped out
+    before the red, did nothing wrong.
+    """
+    step, red = _crossed_at_lights(case)
+    return case.snapshots[step].time if step is not None and red else None
+
+
+def _crossed_at_lights(case: Case) -> tuple[int | None, bool]:
+    """When somebody on foot came onto a crossing at lights, and whether it showed red then.
+
+    The snapshot in which it came onto the crossing, or the carriageway beside it; None if it came
+    into the ego's way anywhere else, or began there.
+    """
+    entered = None if case.body is None or is_vehicle(case.tester[0]) else _entered(case)
+    if entered is None:
+        return None, False
+    here = case.tester[entered]
+    for i, crossing in enumerate(case.scene.crossings):
+        if crossing.light is None or not shapely.contains_xy(crossing.surface, here.x, here.y):
+            continue
+        step = entered
+        while step and _on_road(case, crossing, case.tester[step - 1]):
+            step -= 1
+        letters = [s.crossing_lights[i : i + 1] for s in case.snapshots[step - 1 : step + 1]]
+        red = len(letters) == 2 and all(one and one[0] in RED for one in letters)
+        return step or None, red
+    return None, False
+
+
+def _on_road(case: Case, crossing: MarkedCrossing, body: BodyState) -> bool:
+    """Whether a body is on a crossing or a carriageway."""
+    roads = case.scene.roads
+    if roads is not None and roads.contains(body.x, body.y):
+        return True
+    return bool(shapely.contains_xy(crossing.surface, body.x, body.y))
+
+
 def stepped_out(case: Case) -> float | None:
     """Somebody on foot stepped onto the carriageway within the ego's stopping distance.
 
     The step is the last time before the violation at which the body came onto the carriageway or,
     on it, began to walk, while it was not yet in the ego's way. The stopping distance is that of
-    rule 126, thinking and braking.
+    rule 126, thinking and braking. Not so at a crossing at lights that did not show red to it.
     """
     roads = case.scene.roads
     if roads is None or case.body is None or is_vehicle(case.tester[0]):
+        return None
+    crossed, red = _crossed_at_lights(case)
+    if crossed is not None and not red:
         return None
     step: int | None = None
     walked = False
@@ -223,6 +267,7 @@ RULES: Mapping[str, Callable[[Case], float | None]] = {
     "ego:red-light": ran_red_light,
     "ego:speed": speeded,
     "ego:rss-response": answered_improperly,
+    "tester:red-man": walked_at_red,
     "tester:stepped-out": stepped_out,
     "tester:stepped-in": stepped_in,
     "tester:cut-in": cut_in,

@@ -2,17 +2,16 @@
 
 Of the ego and the testers, pedestrians too, until the first contact between them. The snapshots are
 kept while the episode goes on and measured once, at its end. An exact time to collision costs ten
-times as much as one of the circles around two bodies, which it is never below: so these come first,
-and the boxes only of those that could still be the most critical. Of two tracks only places near
-each other are compared. ``metrics`` has the same for arrays, without bounds.
+times as much as one of the circles around two bodies, which it is never below: so these come
+first, and the boxes only of those that could still be the most critical. Of two tracks only parts
+near each other are compared. ``metrics`` has the same for arrays, without bounds.
 """
 
 from __future__ import annotations
 
 import math
-from bisect import bisect_left, bisect_right
 from collections.abc import Iterator, Sequence
-from itertools import compress
+from operator import itemgetter
 from typing import NamedTuple
 
 from cavsumo.contacts import STANDING_MPS, Contact
@@ -20,6 +19,8 @@ from cavsumo.geometry import overlap
 from cavsumo.snapshot import BodyState, Snapshot
 
 HORIZON_S = 10.0  # what lies farther ahead, or farther apart, is not critical
+ROUNDING_M = 1e-6  # added where a bound must not leave out who just touches
+STRETCH = 8  # moments of a track that are looked at together
 Track = list[tuple[float, BodyState]]  # where a body was when; while it stands only the ends
 # A lower bound of the time to collision, the closing speed along the ego's heading, the two.
 Pair = tuple[float, float, BodyState, BodyState]
@@ -140,89 +141,110 @@ def ttc(first: BodyState, second: BodyState) -> float:
 
 def _smallest_pet(kept: Sequence[Snapshot]) -> float:
     """Smallest post-encroachment time of the ego and a tester that moved [s]."""
-    best, ego = math.inf, None
+    best, first = math.inf, None
     times = [s.time for s in kept]
-    for i, first in enumerate(kept[0].testers if kept else ()):
-        if kept[-1].testers[i] is not first:  # else it stood where it stood
-            ego = ego or track(times, [s.ego for s in kept])
-            best = min(best, pet(ego, track(times, [s.testers[i] for s in kept])))
+    for i, tester in enumerate(kept[0].testers if kept else ()):
+        if kept[-1].testers[i] is not tester:  # else it stood where it stood
+            if first is None:
+                others = max(t.body.kind.reach for t in kept[0].testers)
+                reach = kept[0].ego.body.kind.reach + others + ROUNDING_M
+                first = stretches(track(times, [s.ego for s in kept]), reach)
+            best = min(best, pet(first, track(times, [s.testers[i] for s in kept])))
     return best
 
 
 def track(times: Sequence[float], states: Sequence[BodyState]) -> Track:
     """Where a body was; of the time that it stands in one place only the first and the last."""
-    places = [state[1:3] for state in states]
-    around = zip([None, *places], places, [*places[1:], None], strict=False)
-    ends = [here != before or here != after for before, here, after in around]
-    return list(compress(zip(times, states, strict=True), ends))
+    found: Track = []
+    x = y = math.nan
+    stood = None  # the last moment, if it is where the one before was
+    for moment in zip(times, states, strict=True):
+        _, here, there, _, _ = moment[1]
+        if here == x and there == y:
+            stood = moment
+            continue
+        if stood:
+            found.append(stood)
+            stood = None
+        found.append(moment)
+        x, y = here, there
+    return [*found, stood] if stood else found
 
 
-def pet(first: Track, second: Track) -> float:
+class Stretch(NamedTuple):
+    """A part of a track with the rectangle, along the axes, in which the centres lie [m]."""
+
+    low_x: float
+    high_x: float
+    low_y: float
+    high_y: float
+    moments: Track
+
+    def apart(self, other: Stretch) -> float:
+        """The time between the two, 0 if one begins before the other ends [s]."""
+        mine, theirs = self.moments, other.moments
+        return max(0.0, mine[0][0] - theirs[-1][0], theirs[0][0] - mine[-1][0])
+
+
+def stretches(track: Track, reach: float) -> list[Stretch]:
+    """A track in parts of ``STRETCH`` moments, their rectangles wider by a reach on each side."""
+    _, xs, ys, _, _ = zip(*(state for _, state in track), strict=True)
+    found = []
+    for i in range(0, len(track), STRETCH):
+        x, y = xs[i : i + STRETCH], ys[i : i + STRETCH]
+        sides = min(x) - reach, max(x) + reach, min(y) - reach, max(y) + reach
+        found.append(Stretch(*sides, track[i : i + STRETCH]))
+    return found
+
+
+def pet(first: Sequence[Stretch], second: Track) -> float:
     """Post-encroachment time of two tracks within ``HORIZON_S``, else infinite [s].
 
-    The same as ``metrics.encroachment.pet_tracks``. Far from the first track the second body is
-    looked at again when it has gone far enough to be near.
+    The same as ``metrics.encroachment.pet_tracks``. Only parts that come near each other are
+    compared, in the order of the least time that can lie between them, until that is more than what
+    was found.
+
+    Args:
+        first: the stretches of a track, with the reach of both bodies.
+        second: the other track.
     """
-    reach = first[0][1].body.kind.reach + second[0][1].body.kind.reach
-    places = [(state[1], state[2]) for _, state in first]
-    times = [t for t, _ in first]
-    stride = max(map(math.dist, places, places[1:]), default=1.0) or 1.0
-    x0 = y0 = math.inf
-    best, leeway, here, hypot = HORIZON_S + 1e-9, 0.0, -1, math.hypot
-    for time, state in second:
-        x, y = state[1], state[2]
-        if here < 0:
-            if hypot(x - x0, y - y0) < leeway:
-                continue
-            far = [hypot(px - x, py - y) for px, py in places]
-            least = min(far)
-            x0, y0, leeway = x, y, least - reach
-            if leeway > 0.0:
-                continue
-            here = far.index(least)
-        # Only who was there less than the best time before or after can be better.
-        begin, end = bisect_left(times, time - best), bisect_right(times, time + best)
-        near = list(_near(places, x, y, reach, stride, here, begin, end))
-        for i in near:
-            if abs(times[i] - time) < best:
-                best = _meeting(first[i], (time, state), best)
-        if near:
-            here = near[len(near) // 2]
-        elif begin <= here < end:
-            here = -1
+    best = HORIZON_S + 1e-9
+    pairs = [(a.apart(b), a, b) for a, b in _meetings(first, stretches(second, 0.0))]
+    for apart, a, b in sorted(pairs, key=itemgetter(0)):
+        if apart >= best:
+            break
+        best = _least(a.moments, b.moments, best)
     return best if best <= HORIZON_S else math.inf
 
 
-def _near(
-    places: Sequence[tuple[float, float]],
-    x: float,
-    y: float,
-    reach: float,
-    stride: float,
-    here: int,
-    begin: int,
-    end: int,
-) -> Iterator[int]:
-    """The places from ``begin`` to ``end`` within reach of a point, from one of them on.
-
-    Places that follow each other are at most a stride apart, so some can be left out.
-    """
-    here = max(begin, min(here, end))
-    for k, way in ((here, 1), (here - 1, -1)):
-        while begin <= k < end:
-            px, py = places[k]
-            beyond = math.hypot(px - x, py - y) - reach
-            if beyond <= 0.0:
-                yield k
-                k += way
-            else:
-                k += way * (int(beyond / stride) or 1)
+def _meetings(
+    first: Sequence[Stretch], second: Sequence[Stretch]
+) -> Iterator[tuple[Stretch, Stretch]]:
+    """The stretches whose rectangles overlap."""
+    low_xs, high_xs, low_ys, high_ys, _ = zip(*second, strict=True)
+    low_x, high_x, low_y, high_y = min(low_xs), max(high_xs), min(low_ys), max(high_ys)
+    for one in first:
+        x0, x1, y0, y1, _ = one
+        if x0 <= high_x and low_x <= x1 and y0 <= high_y and low_y <= y1:  # one of them may
+            for other in second:
+                u0, u1, w0, w1, _ = other
+                if x0 <= u1 and u0 <= x1 and y0 <= w1 and w0 <= y1:
+                    yield one, other
 
 
-def _meeting(one: tuple[float, BodyState], two: tuple[float, BodyState], best: float) -> float:
-    """The time between two bodies being in one place, or what was best so far."""
-    (then, a), (now, b) = one, two
-    across = (b.x - a.x) * math.sin(a.o) - (b.y - a.y) * math.cos(a.o)
-    if abs(across) > a.body.kind.width / 2 + b.body.kind.reach or not overlap(a.box, b.box):
-        return best
-    return abs(then - now)
+def _least(first: Track, second: Track, best: float) -> float:
+    """The least time between two bodies being in one place, or what was best so far."""
+    later = first[0][0] > second[0][0]  # those nearest in time come first
+    ones, others = (first, second[::-1]) if later else (first[::-1], second)
+    mine, reach = ones[0][1].body.kind, others[0][1].body.kind.reach + ROUNDING_M
+    ahead, aside = mine.length / 2 + reach, mine.width / 2 + reach
+    for then, place in ones:
+        _, x, y, _, o = place
+        c, s = math.cos(o), math.sin(o)
+        for now, other in others:
+            if -best < then - now < best:
+                dx, dy = other[1] - x, other[2] - y
+                near = -aside <= dy * c - dx * s <= aside and -ahead <= dx * c + dy * s <= ahead
+                if near and overlap(place.box, other.box):
+                    best = abs(then - now)
+    return best

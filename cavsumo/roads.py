@@ -72,7 +72,8 @@ class MarkedCrossing:
         id: of the crossing in the network.
         begin, end: where the ego's path enters and leaves its surface [m].
         surface: the crossing.
-        signalled: whether traffic lights control it.
+        light: id of the traffic light that controls it, and the index of its letter there for who
+            walks over it; None without.
         priority: whether pedestrians on it go before vehicles, as on a zebra crossing.
     """
 
@@ -80,8 +81,13 @@ class MarkedCrossing:
     begin: float
     end: float
     surface: shapely.Geometry
-    signalled: bool
+    light: tuple[str, int] | None
     priority: bool
+
+    @property
+    def signalled(self) -> bool:
+        """Whether a traffic light controls it."""
+        return self.light is not None
 
 
 class Limit(NamedTuple):

@@ -45,9 +45,10 @@ def crossings_along(network: Network, route: EgoRoute) -> tuple[MarkedCrossing, 
 def _marked(edge: Any, begin: float, end: float, surface: shapely.Geometry) -> MarkedCrossing:
     """A crossing with what the network says of who goes first."""
     links = [link for way in edge.getIncoming().values() for link in way]
-    signalled = any(link.getTLSID() for link in links)
-    priority = not signalled and any(link.getState() == PRIORITY for link in links)
-    return MarkedCrossing(str(edge.getID()), begin, end, surface, signalled, priority)
+    lights = [(str(link.getTLSID()), int(link.getTLLinkIndex())) for link in links]
+    light = next((light for light in lights if light[0]), None)
+    priority = light is None and any(link.getState() == PRIORITY for link in links)
+    return MarkedCrossing(str(edge.getID()), begin, end, surface, light, priority)
 
 
 def _ends(path: LineString, shared: shapely.Geometry) -> tuple[float, float]:

@@ -107,7 +107,10 @@ class Observer:
             return self._remembered(snapshot, seen)
         testers = tuple([t for t in seen.testers if t is not None])
         return snapshot._replace(
-            testers=testers, raw_background=seen.background, lights=seen.lights
+            testers=testers,
+            raw_background=seen.background,
+            lights=seen.lights,
+            crossing_lights=(),
         )
 
     def _remembered(self, snapshot: Snapshot, seen: Measurement) -> Snapshot:
@@ -131,6 +134,7 @@ class Observer:
             raw_background=seen.background,
             lights=seen.lights,
             unseen=frozenset(unseen),
+            crossing_lights=(),
         )
 
     def _measure(self, snapshot: Snapshot) -> Measurement:

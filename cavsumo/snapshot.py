@@ -53,6 +53,8 @@ class Snapshot(NamedTuple):
             is yellow, r is red).
         unseen: ids of the ego and of testers whom a tester agent does not see through its sensor
             (``sensors``): they are shown where it last saw them. None without such a sensor.
+        crossing_lights: what each of ``Scene.crossings`` shows who walks over it, empty for one
+            without lights. Sensors leave it out.
     """
 
     step: int
@@ -63,6 +65,7 @@ class Snapshot(NamedTuple):
     raw_background: tuple[RawState, ...] = ()
     lights: tuple[str, ...] = ()
     unseen: frozenset[str] | None = None
+    crossing_lights: tuple[str, ...] = ()
 
     @property
     def sees_ego(self) -> bool:

@@ -311,7 +311,11 @@ class World:
         time = round(self._step * self.dt, 6)
         state = libsumo.trafficlight.getRedYellowGreenState
         lights = tuple([state(light.id)[light.link] for light in self.site.lights])
-        return Snapshot(self._step, time, ego, self._steering, states, raw, lights)
+        walks = [crossing.light for crossing in self.site.marked]
+        crossings = tuple([state(light[0])[light[1]] if light else "" for light in walks])
+        return Snapshot(
+            self._step, time, ego, self._steering, states, raw, lights, crossing_lights=crossings
+        )
 
     def _lookout(self, everything: bool, watchers: Sequence[BodyState]) -> Background:
         """The background of this episode; the network is measured when that first matters."""

@@ -8,6 +8,7 @@ from collections.abc import Callable
 from typing import Any
 
 import pytest
+from shapely.geometry import Point
 from staging import Stage
 
 from cavsumo.blame import RULES
@@ -105,6 +106,21 @@ def test_a_red_light(staged: Staged) -> None:
     stage = Stage(*staged("junction", signal="red"))
     there = stage.beside(stage.site.lights[0].along + 50.0, 0.0, LEFT)
     assert to_blame(stage, at(10.0), [there], testers=stands, start=10.0) == "ego:red-light"
+
+
+@pytest.mark.parametrize(
+    ("signal", "blame"), [("green", "tester:red-man"), ("red", "ego:red-light")]
+)
+def test_a_crossing_at_lights(staged: Staged, signal: str, blame: str) -> None:
+    """Where the ego has green, who walks over the crossing has red; and the other way round."""
+    stage = Stage(*staged("junction", signal=signal))
+    crossing = stage.site.marked[0]
+    middle = (crossing.begin + crossing.end) / 2
+    places = [stage.beside(middle, -0.1 * i, LEFT) for i in range(20, 200)]
+    kerb = next(p for p in places if not crossing.surface.buffer(0.1).contains(Point(p.x, p.y)))
+    aside = -stage.site.route.path.project(kerb.x, kerb.y).lateral
+    walks = crosses(8.0 * (aside - 1.0) / 1.4)
+    assert to_blame(stage, at(8.0), [kerb], testers=walks, start=8.0) == blame
 
 
 def test_a_vehicle_cuts_in(straight: Stage) -> None:

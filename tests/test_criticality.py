@@ -11,13 +11,14 @@ from hypothesis import strategies as st
 
 from cavsumo.bodies import CAR, PEDESTRIAN, Body
 from cavsumo.contacts import ContactMonitor
-from cavsumo.criticality import HORIZON_S, Course, Extremes, pet, track
+from cavsumo.criticality import HORIZON_S, Course, Extremes, pet, stretches, track
 from cavsumo.metrics.encroachment import pet_tracks
 from cavsumo.metrics.plane import drac_boxes, ttc_boxes
 from cavsumo.snapshot import BodyState, Snapshot
 
 EGO, WALKER = Body("ego", CAR), Body("tester0", PEDESTRIAN)
 State = tuple[float, float, float, float]  # x, y, v, o
+Turns = Sequence[tuple[float, float, int]]  # speed, heading, number of timesteps
 ANGLES = st.floats(-math.pi, math.pi)
 STATES = st.tuples(st.floats(-30, 30), st.floats(-30, 30), st.floats(0, 10), ANGLES)
 
@@ -29,6 +30,16 @@ def moved(state: State, steps: int, stops: int = 10**6) -> list[State]:
     for i in range(steps):
         found.append((x, y, v if i < stops else 0.0, o))
         if i < stops:
+            x, y = x + 0.1 * v * math.cos(o), y + 0.1 * v * math.sin(o)
+    return found
+
+
+def winding(turns: Turns) -> list[State]:
+    """A body that drives at a speed and heading for some steps, then at the next."""
+    x, y, found = 0.0, 0.0, []
+    for v, o, steps in turns:
+        for _ in range(steps):
+            found.append((x, y, v, o))
             x, y = x + 0.1 * v * math.cos(o), y + 0.1 * v * math.sin(o)
     return found
 
@@ -77,6 +88,25 @@ def test_bounds_leave_nothing_out(ego: State, tester: State, stops: int) -> None
     assert found.pet == pytest.approx(whole if whole <= HORIZON_S else math.inf)
 
 
+TURNS = st.lists(st.tuples(st.floats(0, 10), ANGLES, st.integers(1, 20)), min_size=1, max_size=6)
+
+
+@settings(deadline=None)
+@given(ego=TURNS, tester=TURNS)
+def test_pet_of_winding_tracks(ego: Turns, tester: Turns) -> None:
+    """Whatever parts the tracks are cut into, the time is that of all pairs of places."""
+    mine, theirs = (
+        [(round(0.1 * i, 6), BodyState(body, *s)) for i, s in enumerate(winding(turns))]
+        for body, turns in ((EGO, ego), (WALKER, tester))
+    )
+    length = min(len(mine), len(theirs))
+    mine, theirs = mine[:length], theirs[:length]
+    whole = pet_tracks([t for t, _ in mine], [s.box for _, s in mine], [s.box for _, s in theirs])
+    tracks = [track(*zip(*one, strict=True)) for one in (mine, theirs)]
+    found = pet(stretches(tracks[0], CAR.reach + PEDESTRIAN.reach + 1e-6), tracks[1])
+    assert found == pytest.approx(whole if whole <= HORIZON_S else math.inf)
+
+
 def test_hand_computed() -> None:
     """A car at 10 m/s towards somebody who stands 30 m ahead of its bumper; and who walked off."""
     standing = (2.25 + 30.0 + 0.65625 / 2, 0.0, 0.0, 0.0)
@@ -104,5 +134,5 @@ def test_a_body_that_stands_is_two_places() -> None:
     states = [(0.1 * i, BodyState(WALKER, *s)) for i, s in enumerate(waits)]
     places = track(*zip(*states, strict=True))
     assert len(places) == 6
-    passes = [(9.0, states[0][1])]
+    passes = stretches([(9.0, states[0][1])], 2 * PEDESTRIAN.reach)
     assert pet(passes, places) == pytest.approx(9.0 - 2.0, abs=0.2)

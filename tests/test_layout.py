@@ -60,8 +60,8 @@ ORDER = """
     summary interrupts replays seeds subjects opponents certificate listings fcd gui
     pages.shell pages player.packing player.curves player.scenery player.facts player.page player
     report report.load report.grouping report.rates report.pairs report.compare report.survival
-    report.effort report.events report.distinct report.analysis report.tables report.figures
-    report.formats report.junit
+    report.effort report.events report.distinct report.analysis report.cells report.tables
+    report.figures report.formats report.junit
     report.page.scenes report.page.words report.page.plots report.page.places report.page.links
     report.page.document report.page
     testing.scripts testing.ego_checks testing.agent_checks testing.assertion_checks

@@ -133,6 +133,13 @@ def test_a_conflict_is_a_collision_course_on_the_carriageway(
     assert met((12.0, 8.0), tester).conflict is conflict
 
 
+def test_an_ego_that_stands_need_not_set_off(met: Callable[..., Encounter]) -> None:
+    """Whoever is in the strip ahead is a conflict to it; who walks out of it is none beside it."""
+    assert met((12.0, 0.0), (18.0, LANE_Y, 1.4, NORTH)).conflict
+    assert not met((12.0, 0.0), (18.0, LANE_Y - 1.8, 0.0, NORTH)).conflict
+    assert not met((12.0, 2.0), (18.0, LANE_Y, 1.4, NORTH)).conflict  # gone before it is there
+
+
 def test_a_conflict_counts_when_it_lasts(met: Callable[..., Encounter]) -> None:
     """One of 0.3 s is none; the next is, from its beginning; so is one that lasts to the end."""
     yes = met((12.0, 8.0), (30.0, LANE_Y, 0.0, NORTH))
@@ -140,6 +147,9 @@ def test_a_conflict_counts_when_it_lasts(met: Callable[..., Encounter]) -> None:
     assert lasting_conflict([no, yes, yes, yes, no, no, *[yes] * 9], 0.1) == 6
     assert lasting_conflict([no, None, yes, no, yes, yes], 0.1) == 4
     assert lasting_conflict([no] * 5, 0.1) is None
+    assert lasting_conflict([*[yes] * 9, *[no] * 5], 0.1) is None  # it is over
+    assert lasting_conflict([*[yes] * 9, *[no] * 5, *[yes] * 5], 0.1) == 14  # another one
+    assert lasting_conflict([no, *[yes] * 5, *[no] * 4, *[yes] * 2], 0.1) == 1  # a short break
     assert driver("human").perceived([no, *[yes] * 6], 0.1) == 1
     assert driver("ideal").perceived([no, *[yes] * 6], 0.1) == 1
 
@@ -163,6 +173,8 @@ def test_a_situation_is_dangerous_when_neither_distance_is_safe(
     found = met((12.0, 8.0), tester)
     assert dangerous(found) is danger
     assert driver("rss").perceived([None, found], 0.1) == (1 if danger else None)
+    again = [found, None, found, found]
+    assert driver("rss").perceived(again, 0.1) == (2 if danger else None)
 
 
 # The search for the last chance

@@ -38,7 +38,10 @@ def plan(**settings: Any) -> dict[str, Any]:
 
 
 def write(
-    file: Path, outcomes: Sequence[Sequence[str]], status: str = "finished", **settings: Any
+    file: Path,
+    outcomes: Sequence[Sequence[str | Mapping[str, Any]]],
+    status: str = "finished",
+    **settings: Any,
 ) -> Path:
     """A batch whose episodes came out like this: for each seed one outcome an agent."""
     own = plan(**{"runs": len(outcomes), **settings})
@@ -54,10 +57,17 @@ def write(
     return file
 
 
-def made(run: int, own: Mapping[str, Any], outcome: str, seed: int) -> Row:
-    """A row."""
+def judged(avoidable: int, blame: str = "") -> Mapping[str, Any]:
+    """The cells of a failure that a reference driver was asked about."""
+    return {"outcome": FAILED, "avoidable": avoidable, "reference": "human", "blame": blame}
+
+
+def made(run: int, own: Mapping[str, Any], came: str | Mapping[str, Any], seed: int) -> Row:
+    """A row, by its outcome or with further cells."""
+    cells = {"outcome": came} if isinstance(came, str) else came
+    outcome = cells["outcome"]
     agent = own["agents"][run % len(own["agents"])]
-    row = {"run": run, "agent": agent, "seed": seed, "outcome": outcome, "wall_s": 0.5}
+    row = {"run": run, "agent": agent, "seed": seed, "wall_s": 0.5, **cells}
     row |= {"ego": own["scenario"].get("ego", "sumo"), "testers": 3, "reset": "fresh"}
     if outcome == ERROR:
         return row | {"error": "SUMO crashed (SIGSEGV)"}
@@ -185,6 +195,35 @@ def test_shares_by_hand(some: Report) -> None:
     assert (timing.tests.count, timing.tests.total) == (4, 4)
     assert timing.failures.value == 0.5
     assert list(timing.tests.intervals) == ["Wilson", "Clopper-Pearson"]
+
+
+JUDGED = [
+    [{"outcome": "invalid", "breach": "tester0 left the world at 3.0 s"}, judged(1)],
+    [judged(1, "ego:speed"), judged(0, "tester:stepped-out")],
+    [judged(1, "ego:speed"), FAILED],
+]
+
+
+def test_what_could_have_been_avoided_and_who_is_to_blame(tmp_path: Path, says: Says) -> None:
+    """Of the failures that were judged; a failure without a rule broken counts too."""
+    file = write(tmp_path / "judged.csv", JUDGED)
+    random, timing = analyse([file]).rates
+    assert (random.preventable.count, random.preventable.total) == (2, 2)
+    assert (timing.preventable.count, timing.preventable.total) == (1, 2)
+    assert timing.reference == "human"
+    assert {rule: share.count for rule, share in random.blame.items()} == {"ego:speed": 2}
+    assert {rule: share.count for rule, share in timing.blame.items()} == {
+        "no rule": 2,
+        "tester:stepped-out": 1,
+    }
+    assert {share.total for share in timing.blame.values()} == {3}
+    lines = [line.split() for line in says(file).splitlines()]
+    assert ["preventable", "(human)", "1", "of", "2", "judged"] in [line[:6] for line in lines]
+    assert ["tester:stepped-out", "1", "of", "3", "failures"] in [line[:5] for line in lines]
+    assert ["invalid", "1", "of", "3", "episodes"] in lines
+    data = json.loads(says(file, "--format", "json"))
+    assert data["rates"][0]["blame"]["ego:speed"]["count"] == 2
+    assert "blame ego:speed: count,2," in says(file, "--format", "csv")
 
 
 def test_pairs_leave_out_what_either_could_not_play(some: Report) -> None:

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from test_report import ERROR, FAILED, HELD, NOTHING, SOME, UNFAIR, write
+from test_report import ERROR, FAILED, HELD, JUDGED, NOTHING, SOME, UNFAIR, write
 
 from cavsumo.cli import main
 from cavsumo.errors import InputError
@@ -77,6 +77,25 @@ def test_the_answer_comes_first(tmp_path: Path) -> None:
     assert excluded(report).startswith("1 episode of 8 was unfair: a tester left the ego no chance")
     assert excluded(report).endswith("1 could not be played (errors) and are left out.")
     assert headline(report).endswith("Testers: 3 x pedestrian. 8 episodes, seed 1.")
+
+
+def test_the_page_tells_preventable_failures_blame_and_invalid_episodes(
+    tmp_path: Path, page: Page
+) -> None:
+    """With intervals and apart from errors; without judged failures there is no such plot."""
+    file = write(tmp_path / "judged.csv", JUDGED)
+    report = analyse([file])
+    first, second = (text.replace("\N{NO-BREAK SPACE}", " ") for text in answers(report))
+    who = "preventable by a careful human driver (UN R157)"
+    assert first.endswith(f"; 2 {who}, 100.0 % [34.2, 100.0].")
+    assert second.endswith(f"; 1 of the 2 judged {who}, 50.0 % [9.5, 90.5].")
+    assert "1 invalid: a tester broke the rules of the world" in excluded(report)
+    assert excluded(report).endswith("Every episode could be played.")
+    text = Words(page(file)).text
+    assert f"Invalid: {file} run 0: tester0 left the world at 3.0 s" in text
+    assert "Preventable, of judged failures" in text
+    assert "tester:stepped-out" in text
+    assert "Preventable, of judged" not in Words(page(write(tmp_path / "some.csv", SOME))).text
 
 
 def test_nothing_found_is_an_answer(tmp_path: Path) -> None:

@@ -218,8 +218,9 @@ def test_invalid_episodes_are_counted_apart() -> None:
     assert (found.invalid, found.valid, found.rate("tests").value) == (2, 2, 0.5)
     import pandas
 
+    cells = {"outcome": ["held", "invalid"], "avoidable": math.nan, "reference": "", "blame": ""}
     group: Any = SimpleNamespace(
-        rows=pandas.DataFrame({"outcome": ["held", "invalid"], "avoidable": math.nan}),
+        rows=pandas.DataFrame(cells),
         sequential=False,
         whose=("", "a", ""),
     )

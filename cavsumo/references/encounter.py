@@ -11,6 +11,7 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 from cavsumo.agents.driving import extent
+from cavsumo.contacts import STANDING_MPS
 from cavsumo.scene import Scene
 from cavsumo.snapshot import BodyState, Snapshot
 
@@ -46,10 +47,13 @@ class Encounter(NamedTuple):
     def conflict(self) -> bool:
         """Whether both touch if they keep their velocities, and a driver can see it coming.
 
-        The body is on the carriageway, not beside it, and no farther ahead than ``SIGHT_M``.
+        The body is on the carriageway, not beside it, and no farther ahead than ``SIGHT_M``. To
+        an ego that stands whoever is in its strip is a conflict: it need not set off.
         """
         if not self.on_road or self.gap > SIGHT_M or self.gap <= -self.length:
             return False
+        if self.speed <= STANDING_MPS and self.beside < 0.0:
+            return True
         reach, past = _spell(self.gap, self.length, self.speed - self.onward)
         enter, leave = _spell(self.beside, self.width, self.inward)
         return max(reach, enter) < min(past, leave)
@@ -90,16 +94,24 @@ def encounter(scene: Scene, snapshot: Snapshot, body: BodyState) -> Encounter:
 
 
 def lasting_conflict(encounters: Sequence[Encounter | None], dt: float) -> int | None:
-    """The timestep at which the first conflict begins that lasts, or lasts until the end.
+    """The timestep at which the conflict began that is under way at the end; None for none.
 
-    One that is over within ``EVALUATION_S`` would not have been acted upon.
+    A conflict is one to a driver if it lasts for ``EVALUATION_S``, or until the end, and it is over
+    once there has been none for as long: what was settled before has nothing to do with the end.
     """
-    began: int | None = None
+    alarm = began = ceased = None
     for step, met in enumerate(encounters):
-        if met is None or not met.conflict:
-            began = None
-        elif began is None:
-            began = step
-        if began is not None and (step - began) * dt >= EVALUATION_S - 1e-9:
-            return began
-    return began
+        if met is not None and met.conflict:
+            began, ceased = step if began is None else began, None
+            if alarm is None and _lasts(began, step, dt):
+                alarm = began
+        else:
+            began, ceased = None, step if ceased is None else ceased
+            if _lasts(ceased, step, dt):
+                alarm = None
+    return began if alarm is None else alarm
+
+
+def _lasts(since: int, step: int, dt: float) -> bool:
+    """Whether it has been so for as long as a driver takes to evaluate it."""
+    return (step - since) * dt >= EVALUATION_S - 1e-9

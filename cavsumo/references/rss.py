@@ -28,7 +28,13 @@ class RssDriver(Reference):
     words = "a driver with RSS's proper response"
 
     def perceived(self, encounters: Sequence[Encounter | None], dt: float) -> int | None:
-        return next((i for i, met in enumerate(encounters) if met and dangerous(met)), None)
+        since = None
+        for step, met in enumerate(encounters):
+            if met is None or not dangerous(met):
+                since = None
+            elif since is None:
+                since = step
+        return since
 
     def speed_lost(self, elapsed: float, kind: Kind) -> float:
         return ramped(elapsed, RESPONSE_S, 0.0, min(BRAKE_MIN, -kind.throttle_min))

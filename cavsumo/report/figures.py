@@ -70,6 +70,8 @@ def _plain(value: Any, leave_out: Sequence[str] = ()) -> Any:
         return {name: _plain(getattr(value, name)) for name in fields}
     if isinstance(value, tuple) and hasattr(value, "_asdict"):
         return {name: _plain(part) for name, part in value._asdict().items()}
+    if isinstance(value, Mapping):
+        return {name: _plain(part) for name, part in value.items()}
     if isinstance(value, (list, tuple)):
         return [_plain(part) for part in value]
     if isinstance(value, float) and not math.isfinite(value):
@@ -100,10 +102,10 @@ def _figures(record: Any, name: str) -> Iterator[Line]:
     """The figures of one field: quantity, value, low, high, method."""
     value = getattr(record, name)
     if isinstance(value, Share):
-        yield f"{name}: count", value.count, None, None, None
-        yield f"{name}: total", value.total, None, None, None
-        for method, rate in value.intervals.items():
-            yield f"{name}: share", value.value, *_ends(rate), method
+        yield from _share_figures(name, value)
+    elif isinstance(value, Mapping):
+        for key, share in value.items():
+            yield from _share_figures(f"{name} {key}", share)
     elif isinstance(value, PerSecond):
         yield name, value.value, *(value.interval or (None, None)), None
     elif dataclasses.is_dataclass(value):
@@ -111,6 +113,14 @@ def _figures(record: Any, name: str) -> Iterator[Line]:
             yield f"{name}: {field.name}", getattr(value, field.name), None, None, None
     else:
         yield name, value, *(getattr(record, f"{name}_interval", None) or (None, None)), None
+
+
+def _share_figures(name: str, share: Share) -> Iterator[Line]:
+    """The figures of a share."""
+    yield f"{name}: count", share.count, None, None, None
+    yield f"{name}: total", share.total, None, None, None
+    for method, rate in share.intervals.items():
+        yield f"{name}: share", share.value, *_ends(rate), method
 
 
 def _ends(rate: Rate) -> tuple[float | None, float | None]:

@@ -14,8 +14,9 @@ from rich.table import Table as Grid
 from rich.text import Text
 
 from cavsumo.report.analysis import Report
+from cavsumo.report.cells import Table
 from cavsumo.report.figures import COLUMNS, as_json, lines
-from cavsumo.report.tables import Table, tables
+from cavsumo.report.tables import tables
 
 WIDTH, INDENT = 100, 2
 WIDEST = 1000  # of tables whose figures need it, which are never cut off

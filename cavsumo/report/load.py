@@ -28,7 +28,18 @@ NUMBERS = (
     "wall_s",
     "avoidable",
 )
-WORDS = ("agent", "outcome", "assertion", "tester", "trace", "error", "verdicts")
+WORDS = (
+    "agent",
+    "outcome",
+    "breach",
+    "blame",
+    "assertion",
+    "verdicts",
+    "tester",
+    "reference",
+    "trace",
+    "error",
+)
 WHOLE = ("run", "seed")
 NEEDED = (*WHOLE, *WORDS, *NUMBERS)
 ADDED = ("file", "net")  # what one can group by besides the columns

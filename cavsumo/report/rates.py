@@ -6,10 +6,12 @@ from collections import Counter
 from collections.abc import Mapping
 from dataclasses import dataclass
 
+from cavsumo.assertions.base import VIOLATED
 from cavsumo.report.grouping import Group, Told
 from cavsumo.statistics import Rate, rate, sequential_rate
 from cavsumo.tally import Found
 
+NO_RULE = "no rule"  # of those that blame knows
 WILSON, EXACT, SEQUENTIAL = "Wilson", "Clopper-Pearson", "confidence sequence"
 
 
@@ -44,6 +46,8 @@ class Rates(Told):
             world, how many could not be played.
         tests, failures, unfair: of valid episodes, of tests, of valid episodes.
         preventable: failures that the reference driver would have avoided, of those judged.
+        reference: who that is, empty if none was judged.
+        blame: by the rule broken first, as ``party:rule``, the most frequent first: of failures.
     """
 
     episodes: int
@@ -53,13 +57,16 @@ class Rates(Told):
     failures: Share
     unfair: Share
     preventable: Share
+    reference: str
+    blame: Mapping[str, Share]
 
 
 def rates(group: Group) -> Rates:
     """The shares of one group."""
     found = Found(Counter(group.rows["outcome"]))
     sequential = group.sequential
-    judged = group.rows["avoidable"].dropna()
+    judged = group.rows[group.rows["avoidable"].notna()]
+    failed = group.rows[group.rows["outcome"] == VIOLATED]
     return Rates(
         *group.whose,
         episodes=found.episodes,
@@ -69,8 +76,16 @@ def rates(group: Group) -> Rates:
         failures=share(found.failures, found.tests, "tests", sequential=sequential),
         unfair=share(found.unfair, found.valid, "valid episodes", sequential=sequential),
         preventable=share(
-            int((judged == 1).sum()), len(judged), "judged failures", sequential=sequential
+            int((judged["avoidable"] == 1).sum()),
+            len(judged),
+            "judged failures",
+            sequential=sequential,
         ),
+        reference=", ".join(judged["reference"].unique()),
+        blame={
+            rule or NO_RULE: share(count, found.failures, "failures", sequential=sequential)
+            for rule, count in failed["blame"].value_counts().items()
+        },
     )
 
 

@@ -2,61 +2,19 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 
 from cavsumo.report.analysis import Report
+from cavsumo.report.cells import Labels, Table, number, p_value, span
 from cavsumo.report.compare import EVENTS, Comparison
 from cavsumo.report.distinct import PLACE_BIN, SPEED_BIN, Distinct, Diversity, FailureCell
 from cavsumo.report.effort import Effort, PerSecond
-from cavsumo.report.grouping import Told
 from cavsumo.report.load import Batch
-from cavsumo.report.pairs import Interval
 from cavsumo.report.rates import EXACT, SEQUENTIAL, WILSON, Rates, Share
 from cavsumo.report.survival import TimeToTest
 from cavsumo.summary import interval, percent
 
-TOPICS = ("results", "shares", "pairs", "times", "effort", "distinct")
 SHOWN = 10  # cells of failures
-
-
-@dataclass(frozen=True)
-class Table:
-    """A table of text.
-
-    Attributes:
-        topic: what it belongs to, one of ``TOPICS``.
-        title: what it tells.
-        words: the titles of its first columns, which hold words and stand to the left.
-        numbers: the titles of the others, which hold numbers and stand to the right.
-        rows: one cell a column.
-        heads: in how many of the first columns words that repeat those above may be left out.
-        topic: what it belongs to, one of ``TOPICS``.
-        notes: what one must know to read it, a sentence each.
-    """
-
-    topic: str
-    title: str
-    words: Sequence[str]
-    numbers: Sequence[str]
-    rows: Sequence[Sequence[str]]
-    notes: Sequence[str] = ()
-    heads: int = 0
-
-
-class Labels:
-    """The columns that say of whom a row is, as few as are needed."""
-
-    def __init__(self, report: Report) -> None:
-        several = any(group.setting for group in report.groups)
-        self.titles = [*(["setting"] if several else []), "agent"]
-        self.titles += [] if report.by == "agent" else [report.by]
-
-    def cells(self, of: Told) -> list[str]:
-        """The cells for a group."""
-        words = {"setting": of.setting, "agent": of.agent}
-        return [words.get(title, of.value or "(none)") for title in self.titles]
 
 
 def tables(report: Report) -> Iterator[Table]:
@@ -66,6 +24,8 @@ def tables(report: Report) -> Iterator[Table]:
     if not report.groups:
         return
     yield _rates(report.rates, labels)
+    if any(one.blame for one in report.rates):
+        yield _blame(report.rates, labels)
     yield from _comparisons(report, labels)
     yield _times(report.times, labels)
     yield _effort(report, labels)
@@ -111,17 +71,15 @@ def _batch_notes(batches: Sequence[Batch]) -> Iterator[str]:
 def _rates(found: Sequence[Rates], labels: Labels) -> Table:
     """Shares with intervals."""
     kinds = ("tests", "failures", "unfair", "preventable")
-    shares = [getattr(one, what) for one in found for what in kinds]
-    methods = [m for m in (WILSON, EXACT, SEQUENTIAL) if any(m in s.intervals for s in shares)]
+    methods = _methods(found)
     rows = []
     for one in found:
         for what in kinds:
             share: Share = getattr(one, what)
             if what == "preventable" and not share.total:
                 continue
-            cells = [what, str(share.count), f"of {share.total} {share.of}", percent(share.value)]
-            spans = [interval(share.intervals[m]) if m in share.intervals else "" for m in methods]
-            rows.append([*labels.cells(one), *cells, *spans])
+            name = f"{what} ({one.reference})" if what == "preventable" else what
+            rows.append([*labels.cells(one), name, *_share(share, methods)])
         for what, count in (("invalid", one.invalid), ("errors", one.errors)):
             if not count:
                 continue
@@ -132,6 +90,32 @@ def _rates(found: Sequence[Rates], labels: Labels) -> Table:
     return Table(
         "shares", "Shares, with 95 % intervals in %", words, titles, rows, heads=len(words) - 1
     )
+
+
+def _blame(found: Sequence[Rates], labels: Labels) -> Table:
+    """Which rules were broken first where the ego failed."""
+    methods = _methods(found)
+    rows = [
+        [*labels.cells(one), rule, *_share(share, methods)]
+        for one in found
+        for rule, share in one.blame.items()
+    ]
+    titles, words = ("count", "", "share", *methods), (*labels.titles, "party:rule")
+    notes = ["A hint by rules, not law: which party broke which rule of the road first."]
+    title = "Blame for failures, with 95 % intervals in %"
+    return Table("shares", title, words, titles, rows, notes, heads=len(words) - 1)
+
+
+def _methods(found: Sequence[Rates]) -> list[str]:
+    """By which methods there are intervals."""
+    used = {method for one in found for method in one.tests.intervals}
+    return [method for method in (WILSON, EXACT, SEQUENTIAL) if method in used]
+
+
+def _share(share: Share, methods: Sequence[str]) -> list[str]:
+    """The cells of a share."""
+    spans = [interval(share.intervals[m]) if m in share.intervals else "" for m in methods]
+    return [str(share.count), f"of {share.total} {share.of}", percent(share.value), *spans]
 
 
 def _comparisons(report: Report, labels: Labels) -> Iterator[Table]:
@@ -158,9 +142,9 @@ def _comparison(one: Comparison, words: Sequence[str]) -> list[str]:
         str(one.pairs.first),
         str(one.pairs.second),
         "" if one.ratio is None else number(one.ratio),
-        _span(one.interval),
-        _p(one.p),
-        _p(one.p_holm),
+        span(one.interval),
+        p_value(one.p),
+        p_value(one.p_holm),
     ]
 
 
@@ -189,9 +173,9 @@ def _times(found: Sequence[TimeToTest], labels: Labels) -> Table:
             *labels.cells(one),
             str(one.censored),
             "" if one.median is None else f"{one.median:.1f}",
-            _span(one.median_interval, ".1f"),
+            span(one.median_interval, ".1f"),
             "" if one.mean is None else f"{one.mean:.1f}",
-            _span(one.mean_interval, ".1f"),
+            span(one.mean_interval, ".1f"),
             *("none" if n is None else str(n) for n in (one.first_test, one.first_failure)),
         ]
         for one in found
@@ -225,7 +209,7 @@ def _effort(report: Report, labels: Labels) -> Table:
 
 def _effort_cells(found: PerSecond) -> list[str]:
     """A figure per second with its interval."""
-    return ["" if found.value is None else number(found.value), _span(found.interval)]
+    return ["" if found.value is None else number(found.value), span(found.interval)]
 
 
 def _total(efforts: Sequence[Effort]) -> str:
@@ -288,25 +272,3 @@ def _failures(found: Sequence[FailureCell], several: bool) -> Table:
     return Table(
         "distinct", "Failures by cell, the most frequent first", words, numbers, rows, notes
     )
-
-
-def number(value: float) -> str:
-    """Three significant digits, without an exponent where that can be read."""
-    if math.isinf(value) or value == 0:
-        return f"{value:g}"
-    if abs(value) < 1e-4 or abs(value) >= 1e5:
-        return f"{value:.2e}"
-    digits = max(0, 2 - math.floor(math.log10(abs(value))))
-    return f"{value:.{digits}f}"
-
-
-def _span(ends: Interval | None, form: str = "") -> str:
-    """An interval, empty for none."""
-    if ends is None:
-        return ""
-    return "[{}, {}]".format(*(number(e) if not form else format(e, form) for e in ends))
-
-
-def _p(value: float) -> str:
-    """A p-value."""
-    return "< 0.001" if value < 0.001 else f"{value:.3f}"

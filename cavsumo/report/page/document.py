@@ -12,6 +12,7 @@ from markupsafe import Markup
 
 from cavsumo.pages.shell import render, write
 from cavsumo.report.analysis import Report
+from cavsumo.report.cells import TOPICS, Table, number
 from cavsumo.report.compare import EVENTS, Comparison
 from cavsumo.report.page import words
 from cavsumo.report.page.links import Look, chosen, with_pages, write_pages
@@ -28,13 +29,23 @@ from cavsumo.report.page.plots import (
 from cavsumo.report.page.scenes import Scene, scenes
 from cavsumo.report.rates import Share
 from cavsumo.report.survival import Curve
-from cavsumo.report.tables import TOPICS, Table, number, tables
+from cavsumo.report.tables import tables
 from cavsumo.summary import percent
 
 FILES = Path(__file__).parent
 LINES = 30  # of a plot; the tables have all
-OF = {"tests": "of valid episodes", "failures": "of tests", "unfair": "of valid episodes"}
-TITLES = {"tests": "Tests found", "failures": "Failed by the ego", "unfair": "Unfair"}
+OF = {
+    "tests": "of valid episodes",
+    "failures": "of tests",
+    "unfair": "of valid episodes",
+    "preventable": "of judged failures",
+}
+TITLES = {
+    "tests": "Tests found",
+    "failures": "Failed by the ego",
+    "unfair": "Unfair",
+    "preventable": "Preventable",
+}
 
 
 class Plot(NamedTuple):
@@ -87,6 +98,7 @@ def page(
         certainty=words.certainty(report),
         excluded=words.excluded(report),
         errors=words.errors(report),
+        invalid=words.invalid(report),
         batches=list(words.told_batches(report)),
         tables=found,
         labels=[words.label(group, report.by) for group in report.groups],
@@ -105,9 +117,11 @@ def page(
 
 
 def _shares(report: Report) -> Iterator[Plot]:
-    """Interval bars of tests, failures and unfair episodes, a line for each group."""
+    """Interval bars of each kind of share, a line for each group; none where nothing was judged."""
     for what, title in TITLES.items():
         bars = []
+        if what == "preventable" and not any(one.preventable.total for one in report.rates):
+            continue
         for one in report.rates[:LINES]:
             share: Share = getattr(one, what)
             text = percent(share.value)

@@ -7,6 +7,7 @@ from collections.abc import Iterator, Sequence
 
 from cavsumo.errors import CavsumoError
 from cavsumo.player.facts import ego_words, traffic_words
+from cavsumo.references import REFERENCES
 from cavsumo.report.analysis import Report
 from cavsumo.report.grouping import Told
 from cavsumo.report.load import Batch
@@ -72,7 +73,17 @@ def answer(one: Rates, who: str) -> str:
         passed = "it" if tests.count == 1 else "all of them"
         return f"{found}; the ego passed {passed}: it failed {_share(failures)}."
     of = "it" if tests.count == 1 else f"{failures.count} of them"
-    return f"{found}; the ego failed {of}, {_share(failures)}."
+    return f"{found}; the ego failed {of}, {_share(failures)}{_preventable(one)}."
+
+
+def _preventable(one: Rates) -> str:
+    """How many of the failures could have been avoided, if that was asked."""
+    judged = one.preventable
+    if not judged.total:
+        return ""
+    who = REFERENCES.make(one.reference, {}).words if one.reference in REFERENCES else one.reference
+    of = "" if judged.total == one.failures.count else f" of the {judged.total} judged"
+    return f"; {judged.count}{of} preventable by {who}, {_share(judged)}"
 
 
 def certainty(report: Report) -> str:
@@ -94,12 +105,15 @@ def certainty(report: Report) -> str:
 def excluded(report: Report) -> str:
     """What is no test, and what does not count at all."""
     unfair = sum(one.unfair.count for one in report.rates)
-    missing = sum(one.episodes - one.tests.total for one in report.rates)
+    invalid = sum(one.invalid for one in report.rates)
+    missing = sum(one.errors for one in report.rates)
     episodes = sum(one.episodes for one in report.rates)
     said = "No episode was unfair" if not unfair else f"{_many(unfair, 'episode')} of {episodes} "
     if unfair:
         said += "were unfair: " if unfair > 1 else "was unfair: "
         said += "a tester left the ego no chance, so they count as tried but not as tests"
+    if invalid:
+        said += f". {invalid} invalid: a tester broke the rules of the world, so they are left out"
     if missing:
         return f"{said}. {missing} could not be played (errors) and are left out."
     return f"{said}. Every episode could be played."
@@ -107,9 +121,19 @@ def excluded(report: Report) -> str:
 
 def errors(report: Report) -> list[str]:
     """The first messages of episodes that could not be played."""
+    return _first(report, "error", "error")
+
+
+def invalid(report: Report) -> list[str]:
+    """The first breaches of the rules of the world that made an episode invalid."""
+    return _first(report, "invalid", "breach")
+
+
+def _first(report: Report, outcome: str, column: str) -> list[str]:
+    """What a column says of the first episodes with an outcome."""
     rows = report.evidence.rows
-    failed = rows[rows["outcome"] == "error"].head(ERRORS)
-    return [f"{row.file} run {row.run}: {row.error}" for row in failed.itertuples()]
+    found = rows[rows["outcome"] == outcome].head(ERRORS).to_dict("records")
+    return [f"{row['file']} run {row['run']}: {row[column]}" for row in found]
 
 
 def facts(batch: Batch, episodes: int) -> Facts:
