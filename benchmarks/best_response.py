@@ -24,7 +24,7 @@ TRAIN_SEED, SEED = 101, 7
 def main() -> None:
     """Train, play, compare."""
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--train", type=int, default=180, help="training episodes")
+    parser.add_argument("--train", type=int, default=240, help="training episodes")
     parser.add_argument("--runs", type=int, default=100, help="episodes of each tester")
     parser.add_argument("--jobs", type=int, default=2)
     parser.add_argument("--net", nargs="+", default=["junction", "crossing"])

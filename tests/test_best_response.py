@@ -16,7 +16,6 @@ import pytest
 from cavsumo.abstraction import response, solving
 from cavsumo.abstraction.opponent import KEEPS, OLDEST, Counts, Watch, situation
 from cavsumo.abstraction.response import (
-    BACK,
     SPEEDS,
     STAND,
     WALK,
@@ -136,9 +135,9 @@ def one(entry: float, gap: float, v: float, held: int = 0) -> States:
 
 
 def test_a_timestep_is_the_kinematics() -> None:
-    """SUMO moves by the new speed; walking brings the entry nearer, going back farther."""
+    """SUMO moves by the new speed; walking brings the entry nearer."""
     grid = grid_for(driver(10, -4.5), DT)
-    for action, entry in ((STAND, 8.0), (WALK, 7.0), (BACK, 9.0)):
+    for action, entry in ((STAND, 8.0), (WALK, 7.0)):
         after = move(
             one(8, 20.0, 8.0), np.array([action]), np.array([-5.0]), np.array([3]), grid, Aim()
         )
@@ -163,9 +162,9 @@ def test_an_ego_that_keeps_its_speed_keeps_its_zeta() -> None:
 @pytest.mark.parametrize(
     ("gap", "v", "price"),
     [
-        (1.0, 8.0, 1.5),  # in the braking zone, which is 3.6 m long: unfair
-        (-9.0, 8.0, 0.9),  # behind the ego: nothing
-        (4.0, 0.05, 0.9),  # before a standing ego: nothing
+        (1.0, 8.0, 2.0),  # in the braking zone, which is 3.6 m long: unfair
+        (-9.0, 8.0, 1.0),  # behind the ego: nothing
+        (4.0, 0.05, 1.0),  # before a standing ego: nothing
     ],
 )
 def test_entering_at_the_wrong_moment_has_its_price(gap: float, v: float, price: float) -> None:
@@ -202,7 +201,7 @@ def test_the_solution_satisfies_the_bellman_equation(small: None) -> None:
     states, which = layer(grid, grid.committed + 1)
     moves = [
         plan.back_up(states, np.full(len(which), m), plan.model.middles[which], which).worth
-        for m in (STAND, WALK, BACK)
+        for m in (STAND, WALK)
     ]
     start = (grid.committed + 1 + grid.inside) * grid.layer
     value = plan.value[start : start + grid.layer]
@@ -281,7 +280,16 @@ def test_it_learns_and_what_it_learned_is_played_frozen(tmp_path: Path) -> None:
     The ego decides in every timestep here, so that there is but one age and the plan is small.
     """
     base = ("--net", STRAIGHT_NET, "--agent", "best-response", "--testers", 2)
-    base += ("--ego-param", "actionStepLength=0", "--trace", "none", "-q", "--exit-zero", "-e", 15)
+    base += (
+        "--ego-param",
+        "actionStepLength=0",
+        "--trace",
+        "none",
+        "-q",
+        "--exit-zero",
+        "--step-length",
+        0.2,
+    )
     first, second, third = (tmp_path / f"{name}.csv" for name in ("first", "second", "third"))
     taught = cavsumo("run", *base, "--runs", 2, "--seed", 101, "-o", first)
     assert taught.returncode == 0, taught.stderr
@@ -291,7 +299,7 @@ def test_it_learns_and_what_it_learned_is_played_frozen(tmp_path: Path) -> None:
     assert sum(map(sum, counts.taken.values())) > 50
     frozen = ("--param", "learn=false", "--param", f"model={first.with_suffix('.json')}")
     for file, jobs in ((second, 1), (third, 2)):
-        played = cavsumo("run", *base, *frozen, "--runs", 3, "-j", jobs, "-o", file)
+        played = cavsumo("run", *base, *frozen, "--runs", 2, "-j", jobs, "-o", file)
         assert played.returncode == 0, played.stderr
     rows = [
         [line.rsplit(",", 1)[0] for line in f.read_text().splitlines()] for f in (second, third)

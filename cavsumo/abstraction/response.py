@@ -5,8 +5,7 @@ A state is (entry, zeta, v, held, class):
 
 * ``entry``: timesteps until the body enters the strip that the ego sweeps if it walks now. Walking
   makes it one less, exactly, whatever the body's speed; standing leaves it as it is (braking from
-  full speed it first falls and then grows again by as much), going back makes it one more.
-  Below 0 it is in the strip.
+  full speed it first falls and then grows again by as much). Below 0 it is in the strip.
 * ``zeta = (e - d_b) / s``: the gap e left when the body enters if the ego keeps its speed, less the
   braking zone d_b = v^2 / (2 b), in lengths s of the reaction zone. A fair test has 0 < zeta <= 1.
   An ego that keeps its speed keeps its zeta while the body walks, so the grid does not blur it.
@@ -50,12 +49,10 @@ ZETAS = np.linspace(-0.9, 2.7, 13)
 CERTAIN = 0.9  # an acceleration whose hazard is above this gets no older in the model
 CERTAIN_NOT = 0.01  # a hazard below this is none
 NEGLIGIBLE = 1e-3  # branches less likely than this are left out
-BACK_PRICE = 0.01  # of a timestep back, which turns take longer than the model knows
 PATIENCE_S = 10.0  # a tester that waits is disturbed once in so long, on average
 PRECISION = 1e-2
 CLASSES = len(MIDDLES_MPS2)
-STAND, WALK, BACK = 0, 1, 2
-PACE = np.array([0.0, 1.0, -1.0])  # how much each action shortens the time to the entry
+STAND, WALK = 0, 1  # an action is how much it shortens the time to the entry [timesteps]
 BEHIND_M = 5.5  # an ego whose front is so far beyond the body has passed it
 
 
@@ -64,13 +61,13 @@ class Prices(NamedTuple):
 
     Attributes:
         held: a test that the ego passed.
-        missed: no test; another body may still have its chance.
+        missed: no test.
         unfair: a body in the braking zone first.
     """
 
     held: float = 1.0
-    missed: float = 0.9
-    unfair: float = 1.5
+    missed: float = 1.0
+    unfair: float = 2.0
 
 
 @dataclass(frozen=True)
@@ -221,10 +218,9 @@ def move(states: States, action: Ints, a: Floats, held: Ints, grid: Grid, aim: A
     dt = grid.dt
     v = np.maximum(0.0, states.v + a * dt)
     gap = states.gap - v * dt
-    entry = np.minimum(states.entry - PACE[action], grid.before)
+    entry = states.entry - action
     after = States(entry, gap, v, np.minimum(held, grid.ages - 1))
     over, price = _ends_outside(after, grid, aim)
-    price = price + BACK_PRICE * (action == BACK)
     inside = entry <= 1e-9
     if inside.any():
         entering = inside & (states.entry > 1e-9)
@@ -336,7 +332,7 @@ class Plan:
         """One timestep from some states, then the values.
 
         Args:
-            action: STAND, WALK or BACK for each.
+            action: STAND or WALK for each.
             a: the ego's acceleration in the last timestep [m/s2]; ``which``: its class.
         """
         decides, chances = deciding(states, self.model, self.grid.dt)

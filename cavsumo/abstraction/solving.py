@@ -8,7 +8,6 @@ import numpy as np
 
 from cavsumo.abstraction.opponent import Counts
 from cavsumo.abstraction.response import (
-    BACK,
     CLASSES,
     NEGLIGIBLE,
     PRECISION,
@@ -34,7 +33,7 @@ from cavsumo.abstraction.response import (
 from cavsumo.games import Game, from_arrays, solve
 
 ROLLOUTS = 40
-MOVES = (STAND, WALK, BACK)  # while the body can still stop
+MOVES = (STAND, WALK)  # while the body can still stop
 
 
 def best_response(counts: Counts, dt: float, aim: Aim) -> Plan:

@@ -20,7 +20,6 @@ import numpy as np
 from cavsumo.abstraction.coordinates import Coordinates, Relative
 from cavsumo.abstraction.opponent import Counts, Watch, acceleration_class, situation
 from cavsumo.abstraction.response import (
-    BACK,
     STAND,
     WALK,
     ZETAS,
@@ -46,6 +45,7 @@ EXPLORED_AIMS = (0.3, 1.3)  # how far into the reaction zone walks that explore 
 INDIFFERENT = 0.02  # a move is kept unless another is worth more by this
 OFF_THE_LANE_S = 1.1  # who stands no nearer stops nobody
 SLOW_MPS = 0.5  # who goes back brakes to this speed before turning
+BACK = 2  # to where it waited, when there is nothing to be had; the model knows nothing of it
 KNOWN = "best-response"
 
 
@@ -84,8 +84,8 @@ class BestResponseAgent(Agent):
         learn: bool = True,
         explore: int = 60,
         replan: int = 60,
-        missed: float = 0.9,
-        unfair: float = 1.5,
+        missed: float = 1.0,
+        unfair: float = 2.0,
         confidence: float = 0.0,
         run_up_m: float = 0.8,
     ) -> None:
@@ -181,7 +181,7 @@ def entry_time(kind: Kind, here: Relative, dt: float) -> float:
 
 
 class Pupil:
-    """One body of the agent: waits before the kerb, walks, stops or goes back before the strip."""
+    """One body of the agent: waits before the kerb, walks, may stop before the lane and go back."""
 
     def __init__(self, agent: BestResponseAgent, index: int) -> None:
         self.agent, self.scene, self.index = agent, agent.scene, index
@@ -253,14 +253,14 @@ class Pupil:
             gap -= here.v * (entry - grid.before) * grid.dt
             held = (watch.held + round(entry - grid.before)) % grid.ages
             entry = float(grid.before)
-        ones = np.ones(3)
-        states = States(ones * entry, ones * gap, ones * here.v, np.full(3, held))
-        which = np.full(3, acceleration_class(watch.acceleration))
-        backup = plan.back_up(states, np.arange(3), ones * watch.acceleration, which)
+        ones = np.ones(2)
+        states = States(ones * entry, ones * gap, ones * here.v, np.full(2, held))
+        which = np.full(2, acceleration_class(watch.acceleration))
+        backup = plan.back_up(states, np.array([STAND, WALK]), ones * watch.acceleration, which)
         worth = backup.worth
         if worth.max() < INDIFFERENT - plan.aim.prices.missed:  # nothing to be had
             return STAND if entry * grid.dt > OFF_THE_LANE_S else BACK
-        worth[self.last] += INDIFFERENT
+        worth[WALK if self.last == WALK else STAND] += INDIFFERENT
         return int(np.argmax(worth))
 
     def _aside(self, state: BodyState) -> float:
