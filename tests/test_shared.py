@@ -96,8 +96,8 @@ def test_lights_begin_anew(open_world: Opener) -> None:
 
 def test_rows_do_not_depend_on_who_plays_them(networks: dict[str, Path], tmp_path: Path) -> None:
     """One process or two, at once or resumed in the middle of a block: the same rows."""
-    words = ["-n", str(networks["crossing"]), "--reset", "shared", "--runs", str(SHARED_BY + 8)]
-    words += ["--testers", "1"]
+    words = ["-n", str(networks["crossing"]), "--reset", "shared", "--runs", str(SHARED_BY + 3)]
+    words += ["--testers", "1", "--end", "6"]
     alone = run(tmp_path, *words, name="alone.csv")
     assert run(tmp_path, *words, "-j", "2", name="two.csv") == [
         row | {"trace": row["trace"].replace("alone/", "two/")} for row in alone
@@ -113,7 +113,7 @@ def test_every_test_found_was_played_again_in_a_fresh_simulation(
     networks: dict[str, Path], tmp_path: Path
 ) -> None:
     """Tests are rows of fresh simulations, the same rows as without sharing, and replayable."""
-    words = ["-n", str(networks["crossing"]), "--runs", "12", "--testers", "1", *STEADY]
+    words = ["-n", str(networks["crossing"]), "--runs", "8", "--testers", "1", *STEADY]
     shared = run(tmp_path, *words, "--reset", "shared")
     fresh = run(tmp_path, *words, name="fresh.csv")
     assert {row["reset"] for row in shared} == {"fresh", "shared"}
@@ -137,7 +137,7 @@ def test_the_summary_says_how_many_did_not_come_out_again(
 ) -> None:
     """Found and lost are counted: a search does not pass for a measurement."""
     command = [sys.executable, "-m", "cavsumo", "run", "-n", str(networks["crossing"])]
-    command += ["--runs", "10", "--reset", "shared", "--trace", "none", "-o", "r.csv"]
+    command += ["--runs", "6", "--reset", "shared", "--trace", "none", "-o", "r.csv"]
     done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, timeout=120)
     rows = read_rows(tmp_path / "r.csv")
     found = sum(row["reset"] == "fresh" for row in rows)

@@ -201,10 +201,10 @@ def test_rows_do_not_depend_on_the_processes(
 ) -> None:
     """One process or two, shared or resumed: the same rows, and the manifest knows the traffic."""
     net = ["--net", str(networks["crossing"]), "--traffic", "6,3"]
-    assert run(tmp_path, monkeypatch, *net, "--runs", "3", "-o", "a.csv") == 0
-    assert run(tmp_path, monkeypatch, *net, "--runs", "3", "-j", "2", "-o", "b.csv") == 0
-    assert run(tmp_path, monkeypatch, *net, "--runs", "2", "-o", "c.csv") == 0
-    assert run(tmp_path, monkeypatch, "--resume", "--runs", "3", "-o", "c.csv") == 0
+    assert run(tmp_path, monkeypatch, *net, "--runs", "2", "-o", "a.csv") == 0
+    assert run(tmp_path, monkeypatch, *net, "--runs", "2", "-j", "2", "-o", "b.csv") == 0
+    assert run(tmp_path, monkeypatch, *net, "--runs", "1", "-o", "c.csv") == 0
+    assert run(tmp_path, monkeypatch, "--resume", "--runs", "2", "-o", "c.csv") == 0
     rows = [
         [{k: v for k, v in row.items() if k != "wall_s"} for row in read_rows(tmp_path / name)]
         for name in ("a.csv", "b.csv", "c.csv")
