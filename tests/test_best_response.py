@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import csv
 import dataclasses
 import json
 import math
@@ -290,7 +291,7 @@ def test_it_learns_and_what_it_learned_is_played_frozen(tmp_path: Path) -> None:
         "--step-length",
         0.2,
     )
-    first, second, third = (tmp_path / f"{name}.csv" for name in ("first", "second", "third"))
+    first, second = tmp_path / "first.csv", tmp_path / "second.csv"
     taught = cavsumo("run", *base, "--runs", 2, "--seed", 101, "-o", first)
     assert taught.returncode == 0, taught.stderr
     model = json.loads(first.with_suffix(".json").read_text())["learned"]["best-response"][0]
@@ -298,14 +299,10 @@ def test_it_learns_and_what_it_learned_is_played_frozen(tmp_path: Path) -> None:
     counts = Counts.of(model["counts"])
     assert sum(map(sum, counts.taken.values())) > 50
     frozen = ("--param", "learn=false", "--param", f"model={first.with_suffix('.json')}")
-    for file, jobs in ((second, 1), (third, 2)):
-        played = cavsumo("run", *base, *frozen, "--runs", 2, "-j", jobs, "-o", file)
-        assert played.returncode == 0, played.stderr
-    rows = [
-        [line.rsplit(",", 1)[0] for line in f.read_text().splitlines()] for f in (second, third)
-    ]
-    assert rows[0] == rows[1]
-    assert not any(",error," in line for line in rows[0])
+    played = cavsumo("run", *base, *frozen, "--runs", 2, "-j", 2, "-o", second)
+    assert played.returncode == 0, played.stderr
+    with second.open(encoding="utf-8") as rows:
+        assert all(row["outcome"] != "error" for row in csv.DictReader(rows))
     manifest = json.loads(second.with_suffix(".json").read_text())
     assert str(first.with_suffix(".json")) in manifest["sha256"]
     assert "best-response" not in manifest.get("learned", {})
