@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from cavsumo.games.model import Bools, Game, Ints
-from cavsumo.games.parts import firsts
+from cavsumo.games.parts import firsts, gathered, starts
 
 SWEEPS = 2
 WORTH_IT = 2000  # states from which a choice is made
@@ -34,12 +34,12 @@ def _one_move(game: Game, moves: Bools) -> Any:
     """Transitions between states under the first move of each, none from goals."""
     from scipy.sparse import csr_matrix
 
-    cells = firsts(np.flatnonzero(moves), game.cell_state)
-    part = game.matrix[cells]
-    start = np.zeros(game.n_states + 1, dtype=part.indptr.dtype)
-    start[game.cell_state[cells] + 1] = np.diff(part.indptr)
-    square = (game.n_states, game.n_states)
-    return csr_matrix((part.data, part.indices, np.cumsum(start, dtype=start.dtype)), shape=square)
+    cells, n = firsts(np.flatnonzero(moves), game.cell_state), game.n_states
+    parts = (game.outcome_start, game.successor, game.probability, cells)
+    begin, to, chance = gathered(*parts, np.arange(n, dtype=np.int32), game.fast)
+    sizes = np.zeros(n, dtype=np.int64)
+    sizes[game.cell_state[cells]] = np.diff(begin)
+    return csr_matrix((chance, to, starts(sizes)), shape=(n, n))
 
 
 def _deepest_first(matrix: Any, live: Ints, root: int) -> Ints:

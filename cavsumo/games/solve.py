@@ -210,12 +210,12 @@ def _noise(game: Game, reading: Reading, play: Play, value: Floats, left: float)
     whole[play.arena.states] = value[:-1]
     rise, error = rises_of(game, whole)
     error *= 4.0
-    near = np.abs(rise) <= 2.0 * (error + left)
+    near = np.flatnonzero(np.abs(rise) <= 2.0 * (error + left))
     if reading is Reading.B:  # rises cancel in a mixture
-        near[:] = True
+        near = np.arange(game.n_cells)
         error += 24.0 * coarseness(value)
     most = np.zeros(game.n_states)
-    np.maximum.at(most, game.cell_state, np.where(near, error, 0.0))
+    np.maximum.at(most, game.cell_state[near], error[near])
     return np.append(most[play.arena.states], 0.0)
 
 
