@@ -258,6 +258,19 @@ def test_what_cannot_be_played_is_refused(params: dict[str, Any], said: str) -> 
         AGENTS.make("best-response", params)
 
 
+@pytest.mark.parametrize(
+    ("key", "value"),
+    [("ages", []), ("sums", [[0.0, 1]]), ("taken", {"1,2,3": [1]}), ("taken", {"a": [0] * 6}),
+     ("taken", {"1,2,3": [-1] * 6}), ("sums", [[math.nan, 0]] * 6), ("taken", [1])],
+)  # fmt: skip
+def test_damaged_counts_are_refused(tmp_path: Path, key: str, value: Any) -> None:
+    """Before anything is played, in one sentence."""
+    file = tmp_path / "model.json"
+    file.write_text(json.dumps({"counts": {**driver(1, -4.5).plain(), key: value}}))
+    with pytest.raises(InputError, match="agent best-response: model"):
+        AGENTS.make("best-response", {"model": str(file)})
+
+
 @pytest.mark.parametrize("text", ["", "[]", '{"counts": {}}', '{"learned": {"timing": null}}'])
 def test_a_file_without_counts_is_refused(tmp_path: Path, text: str) -> None:
     """It says what was expected."""

@@ -17,6 +17,7 @@ from __future__ import annotations
 
 import bisect
 import itertools
+import math
 from collections.abc import Iterable, Mapping
 from typing import Any
 
@@ -179,12 +180,26 @@ class Counts:
     def of(cls, data: Mapping[str, Any]) -> Counts:
         """The counts of plain data; ValueError, KeyError or TypeError if it is none."""
         counts = cls()
-        counts.ages = [[[int(n) for n in pair] for pair in ages] for ages in data["ages"]]
-        counts.sums = [[float(total), int(n)] for total, n in data["sums"]]
-        for text, row in data["taken"].items():
-            entry, need, speed = (int(part) for part in text.split(","))
-            counts.taken[entry, need, speed] = [int(n) for n in row]
+        counts.ages = [[[_count(n) for n in pair] for pair in ages] for ages in data["ages"]]
+        counts.sums = [[float(total), _count(n)] for total, n in data["sums"]]
+        for text, row in dict(data["taken"]).items():
+            entry, need, speed = (_count(int(part)) for part in text.split(","))
+            counts.taken[entry, need, speed] = [_count(n) for n in row]
+        shape = [[len(pair) for pair in ages] for ages in counts.ages]
+        if shape != [[2] * (OLDEST + 1)] * 2:
+            raise ValueError("ages have another shape")
+        if {len(counts.sums), *map(len, counts.taken.values())} != {len(MIDDLES_MPS2)}:
+            raise ValueError(f"expected {len(MIDDLES_MPS2)} classes of acceleration")
+        if not all(math.isfinite(total) for total, _ in counts.sums):
+            raise ValueError("sums must be finite")
         return counts
+
+
+def _count(n: int) -> int:
+    """A number of times; ValueError if it is none."""
+    if n != int(n) or n < 0:
+        raise ValueError(f"expected a count, got {n!r}")
+    return int(n)
 
 
 def aware(key: Key) -> int:

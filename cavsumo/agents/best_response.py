@@ -145,11 +145,14 @@ class BestResponseAgent(Agent):
 
     def _look(self, snapshot: Snapshot) -> None:
         """See what the ego did, and count it in the situation in which it was."""
+        if not snapshot.sees_ego:
+            self._watch, self._told = Watch(self._watch.dt), None
+            return
         watch, held = self._watch, self._watch.held
         watch.see(snapshot.ego.v)
         if not self.learn:
             return
-        if watch.changed is not None and self._told is not None and snapshot.sees_ego:
+        if watch.changed is not None and self._told is not None:
             self.counts.add(self._told, held, watch.acceleration, changed=watch.changed)
         self._told = self._situation(snapshot)
 
