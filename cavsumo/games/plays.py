@@ -74,6 +74,7 @@ class TurnBased:
 
     def __init__(self, arena: Arena) -> None:
         self.arena = arena
+        self._last: tuple[Ints, Any] | None = None  # pairs come again, shifted: their transitions
         self._bellman: Any = backups
         if arena.fast:
             from cavsumo.games.compiled import bellman
@@ -91,7 +92,9 @@ class TurnBased:
 
     def system(self, pair: Ints) -> tuple[Any, Floats]:
         """See ``Play``."""
-        return self.arena.transitions(pair), np.append(self.arena.reward[pair], 0.0)
+        if self._last is None or not np.array_equal(self._last[0], pair):
+            self._last = pair, self.arena.transitions(pair)
+        return self._last[1], np.append(self.arena.reward[pair], 0.0)
 
     def tester(self, game: Game, pair: Ints, value: Floats) -> Floats:
         """See ``Play``."""
