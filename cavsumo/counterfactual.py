@@ -28,7 +28,9 @@ from cavsumo.simulator import Episode, Performance
 from cavsumo.snapshot import BodyState, Snapshot
 from cavsumo.stage import Stage
 
-MOST_RERUNS = 20  # a search that needs more gives up
+MOST_RERUNS = 6  # a handful; a search that needs more says how far it came
+STRIDES = (1, 4)  # how far from the last answer the next one is asked for, then halfway [timesteps]
+NOTABLE_MPS = 1.5  # less speed lost avoids little
 STILL_MPS = 1e-6  # rounding apart, the ego has come to stand
 NOT_MONOTONE = "not monotone: a later takeover avoided it and an earlier one did not"
 
@@ -122,17 +124,21 @@ class Retrial:
 
         def avoids(step: int) -> bool:
             if step not in outcomes:
-                if len(outcomes) > MOST_RERUNS:
-                    raise Diverged(f"{MOST_RERUNS} reruns were not enough")
                 outcomes[step] = self._avoided(reference, step)
             return outcomes[step]
 
-        last = latest(avoids, min(guess, end - 1), end)
         avoidable = avoids(perceived)
-        note = "" if avoidable == (perceived <= last) else NOT_MONOTONE
-        if last < 0:
+        low, high = latest(avoids, guess, perceived if avoidable else -1, end, MOST_RERUNS - 1)
+        notes = [NOT_MONOTONE] if perceived < low and not avoidable else []
+        if high - low > 1:
+            notes.append(
+                f"{MOST_RERUNS} reruns leave open whether one until "
+                f"{frames[high - 1].time:.1f} s is late enough"
+            )
+        note = "; ".join(notes)
+        if low < 0:
             return Verdict(avoidable, note=note)
-        return Verdict(avoidable, frames[last].time, frames[end].time - frames[last].time, note)
+        return Verdict(avoidable, frames[low].time, frames[end].time - frames[low].time, note)
 
     def _risk(self, reference: Reference) -> tuple[int, int]:
         """When the reference perceives the risk, and a guess of the last chance, as timesteps.
@@ -142,13 +148,21 @@ class Retrial:
         dt, end = self.stage.world.dt, self.end
         bodies = self._bodies()
         if bodies is None:
-            return self._trigger(), end - 1
+            return self._trigger(), end - self._delay(reference)
         scene, frames = self._scene(), self.episode.frames[: end + 1]
         met = [b and encounter(scene, f, b) for f, b in zip(frames, bodies, strict=True)]
         found = reference.perceived(met, dt)
         there = [b for b in bodies if b is not None]
         guess = foreseen(frames, there, reference, dt) if len(there) == len(bodies) else end - 1
+        if self.episode.judgement.impact_speed is None:  # it needs no touch to be violated
+            guess = min(guess, end - self._delay(reference))
         return (end if found is None else found), guess
+
+    def _delay(self, reference: Reference) -> int:
+        """How many timesteps it takes a reference to change the course of things a little."""
+        dt, kind = self.stage.world.dt, self.stage.ego.kind
+        steps = range(self.end)
+        return next((i for i in steps if reference.speed_lost(i * dt, kind) >= NOTABLE_MPS), 1)
 
     def _trigger(self) -> int:
         """The timestep at which the precondition began to hold."""
@@ -217,32 +231,32 @@ def _again(chosen: Sequence[Sequence[Action]], agent: Agent) -> RecordedAgent:
     return again
 
 
-def latest(avoids: Callable[[int], bool], guess: int, end: int) -> int:
-    """The last timestep before ``end`` at which a takeover avoids, -1 for none.
+def latest(
+    avoids: Callable[[int], bool], guess: int, low: int, high: int, most: int
+) -> tuple[int, int]:
+    """The last timestep at which a takeover avoids, and the first after it at which none does.
 
-    Assumes that whatever a takeover avoids an earlier one avoids too, and that one at ``end`` does
-    not. Searches outwards from a guess with doubling steps, then by bisection: a right guess is
-    confirmed by two calls.
+    Assumes that whatever a takeover avoids an earlier one avoids too. Asks at a guess, next to it
+    and some steps on, then by bisection: a right guess is confirmed by two calls. Where ``most``
+    calls are not enough the two are further apart.
+
+    Args:
+        low, high: a timestep at which a takeover is known to avoid, -1 for none, and one at which
+            it is known not to.
     """
-    low, high, stride = -1, end, 1
-    probe = max(0, guess)
-    if guess < 0 and not avoids(0):
-        return -1
-    while 0 <= probe < end:
+    probe = min(max(guess, low + 1), high - 1)
+    strides = iter(STRIDES)
+    for _ in range(most):
+        if high - low <= 1:
+            break
+        stride = next(strides, high)
         if avoids(probe):
             low, probe = probe, probe + stride
         else:
             high, probe = probe, probe - stride
-        stride *= 2
-        if low >= 0 and high < end:
-            break
-    while high - low > 1:
-        probe = (low + high) // 2
-        if avoids(probe):
-            low = probe
-        else:
-            high = probe
-    return low
+        if not low < probe < high:
+            probe = (low + high) // 2
+    return low, high
 
 
 def _named(frame: Snapshot, name: str) -> BodyState | None:

@@ -147,6 +147,11 @@ def test_a_conflict_counts_when_it_lasts(met: Callable[..., Encounter]) -> None:
     assert lasting_conflict([no, yes, yes, yes, no, no, *[yes] * 9], 0.1) == 6
     assert lasting_conflict([no, None, yes, no, yes, yes], 0.1) == 4
     assert lasting_conflict([no] * 5, 0.1) is None
+    leaving = met((12.0, 8.0), (30.0, LANE_Y, 1.4, NORTH))
+    assert leaving.in_way
+    assert not leaving.conflict
+    assert lasting_conflict([*[leaving] * 9, yes], 0.1) == 9
+    assert lasting_conflict([*[yes] * 9, *[leaving] * 9, yes], 0.1) == 0  # never out of the lane
     assert lasting_conflict([*[yes] * 9, *[no] * 5], 0.1) is None  # it is over
     assert lasting_conflict([*[yes] * 9, *[no] * 5, *[yes] * 5], 0.1) == 14  # another one
     assert lasting_conflict([no, *[yes] * 5, *[no] * 4, *[yes] * 2], 0.1) == 1  # a short break
@@ -182,17 +187,26 @@ def test_a_situation_is_dangerous_when_neither_distance_is_safe(
 
 @pytest.mark.parametrize("end", [1, 2, 7, 100, 600])
 def test_the_search_finds_the_last_chance(end: int) -> None:
-    """Wherever it lies and wherever the search begins, with few looks; two for a right guess."""
+    """Wherever it lies and wherever the search begins, with few looks; two for a right guess.
+
+    Where looks run out the last chance lies between what is known.
+    """
     for last in {-1, 0, end // 3, end - 2, end - 1} - {-2}:
         for guess in {-1, 0, end // 2, last - 3, last, last + 1, end - 1}:
             if not -1 <= guess < end:
                 continue
             asked: list[int] = []
-            assert latest(_asked(asked, last), guess, end) == last, (last, guess)
+            assert latest(_asked(asked, last), guess, -1, end, 99) == (last, last + 1), guess
             assert all(0 <= step < end for step in asked)
-            assert len(set(asked)) <= 2 + 2 * math.log2(max(2, end)) + 1
+            assert len(asked) == len(set(asked)) <= 5 + math.log2(end + 1)
             if guess == last:
-                assert len(set(asked)) <= 2
+                assert len(asked) <= 2
+            few: list[int] = []
+            low, high = latest(_asked(few, last), guess, -1, end, 3)
+            assert low <= last < high
+            assert few == asked[:3]
+            low, high = latest(_asked([], last), guess, min(last, 1), end, 99)  # some is known
+            assert (low, high) == (last, last + 1)
 
 
 def _asked(asked: list[int], last: int) -> Callable[[int], bool]:

@@ -58,6 +58,11 @@ class Encounter(NamedTuple):
         enter, leave = _spell(self.beside, self.width, self.inward)
         return max(reach, enter) < min(past, leave)
 
+    @property
+    def in_way(self) -> bool:
+        """Whether the body is in the strip and the ego comes nearer, if only for now."""
+        return self.beside < 0.0 and -self.length < self.gap <= SIGHT_M and self.speed > self.onward
+
 
 def _spell(distance: float, length: float, speed: float) -> tuple[float, float]:
     """From when until when two intervals overlap that close at a constant speed [s].
@@ -96,12 +101,13 @@ def encounter(scene: Scene, snapshot: Snapshot, body: BodyState) -> Encounter:
 def lasting_conflict(encounters: Sequence[Encounter | None], dt: float) -> int | None:
     """The timestep at which the conflict began that is under way at the end; None for none.
 
-    A conflict is one to a driver if it lasts for ``EVALUATION_S``, or until the end, and it is over
-    once there has been none for as long: what was settled before has nothing to do with the end.
+    A conflict is one to a driver if it lasts for ``EVALUATION_S``, or until the end. It is over
+    once there has been none for as long and the body was not in the way: what was settled before
+    has nothing to do with the end.
     """
     alarm = began = ceased = None
     for step, met in enumerate(encounters):
-        if met is not None and met.conflict:
+        if met is not None and (met.conflict or (alarm is not None and met.in_way)):
             began, ceased = step if began is None else began, None
             if alarm is None and _lasts(began, step, dt):
                 alarm = began
