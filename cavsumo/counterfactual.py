@@ -132,8 +132,8 @@ class Retrial:
         notes = [NOT_MONOTONE] if perceived < low and not avoidable else []
         if high - low > 1:
             notes.append(
-                f"{MOST_RERUNS} reruns leave open whether one until "
-                f"{frames[high - 1].time:.1f} s is late enough"
+                f"{MOST_RERUNS} reruns leave open whether a perception up to "
+                f"{frames[high - 1].time:.1f} s would have been early enough"
             )
         note = "; ".join(notes)
         if low < 0:
