@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from cavsumo.errors import InputError, UnknownName
+from cavsumo.kinematics import wrap
 
 if TYPE_CHECKING:
     from gymnasium import spaces
@@ -55,6 +56,22 @@ class Kind:
         object.__setattr__(self, "inner", min(self.length, self.width) / 2)
         turning = math.sin(math.atan(0.5 * math.tan(self.steering_max)))
         object.__setattr__(self, "turning", turning)
+
+
+def turn_radius(kind: Kind) -> float:
+    """Radius of the circle on which a body turns at full steering, b / (2 sin beta) [m]."""
+    return kind.wheelbase / (2.0 * kind.turning)
+
+
+def detour(kind: Kind, o: float, heading: float) -> float:
+    """How much longer a way gets by turning from o to its heading first, at full steering [m].
+
+    A body turning by phi on the radius R = b / (2 sin beta) goes R phi and gains R sin phi.
+    """
+    if heading == o:
+        return 0.0
+    phi = abs(wrap(heading - o))
+    return turn_radius(kind) * (phi - math.sin(phi))
 
 
 PEDESTRIAN = Kind(

@@ -67,7 +67,7 @@ def _checked(part: Part, output: Path, manner: Manner) -> Checked:
     _check_output(output)
     recorded = _recorded(output, manner)
     source = f"run: {part.name}" if part.name else "run"
-    setting = prepare(plan_from({**_settings_of(recorded), **part.settings}, source))
+    setting = prepare(plan_from({**recorded_settings(recorded), **part.settings}, source))
     now = manifest(setting)
     different = [] if recorded is None else list(differences(recorded, now))
     if different:
@@ -98,7 +98,7 @@ def _recorded(output: Path, manner: Manner) -> dict[str, Any] | None:
     return read_manifest(output)
 
 
-def _settings_of(recorded: Mapping[str, Any] | None) -> dict[str, Any]:
+def recorded_settings(recorded: Mapping[str, Any] | None) -> dict[str, Any]:
     """The settings of a recorded plan; what is not given again stays as it was."""
     if recorded is None:
         return {}

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any, NoReturn
 
 from cavsumo import __version__
+from cavsumo.cli_certify import add_certify
 from cavsumo.cli_egos import add_check_ego
 from cavsumo.cli_games import add_game
 from cavsumo.cli_networks import add_import_osm, add_inspect
@@ -74,6 +75,7 @@ def _parser() -> argparse.ArgumentParser:
     add_replay(commands)
     add_report(commands)
     add_merge(commands)
+    add_certify(commands)
     add_check_ego(commands)
     add_inspect(commands)
     add_import_osm(commands)

@@ -12,11 +12,10 @@ import dataclasses
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 
-import numpy as np
-
 from cavsumo.agents.base import Agent
+from cavsumo.agents.recorded import RecordedAgent
 from cavsumo.assertions.base import VIOLATED, Assertion, Judgement
-from cavsumo.bodies import NOOP, Action
+from cavsumo.bodies import Action
 from cavsumo.contacts import STANDING_MPS, Contact
 from cavsumo.egos.takeover import Takeover
 from cavsumo.errors import CavsumoError
@@ -71,21 +70,6 @@ class Watch(Assertion):
             if not (is_vehicle(contact.b) and ran_into(contact.b, ego, self.scene.dt)):
                 self.decided = True
                 self.judgement = Judgement(self.name, VIOLATED, contact.b.id)
-
-
-class Playback(Agent):
-    """An agent that does again what another did, then leaves its bodies as they are."""
-
-    def __init__(self, chosen: Sequence[Sequence[Action]], *, sees_background: bool) -> None:
-        self.sees_background = sees_background
-        self._chosen = chosen
-
-    def reset(self, scene: Scene, owned: Sequence[int], rng: np.random.Generator) -> None:
-        super().reset(scene, owned, rng)
-        self._next = iter(self._chosen)
-
-    def choose_action(self, snapshot: Snapshot) -> tuple[Action, ...]:
-        return tuple(next(self._next, (NOOP,) * len(self.owned)))
 
 
 class Diverged(CavsumoError):
@@ -231,14 +215,20 @@ class Retrial:
         what = "the ego" if now.ego != recorded.ego else "somebody"
         raise Diverged(f"the episode again is another one: {what} differs at {now.time:.2f} s")
 
-    def _playbacks(self) -> list[Playback]:
+    def _playbacks(self) -> list[RecordedAgent]:
         """The agents, as they acted."""
         return [
-            Playback(
-                [joint[i] for joint in self.episode.actions], sees_background=a.sees_background
-            )
-            for i, a in enumerate(self.agents)
+            _again([joint[i] for joint in self.episode.actions], agent)
+            for i, agent in enumerate(self.agents)
         ]
+
+
+def _again(chosen: Sequence[Sequence[Action]], agent: Agent) -> RecordedAgent:
+    """An agent that does again what another did, and looks where that one looked."""
+    again = RecordedAgent()
+    again.remember(chosen)
+    again.sees_background = agent.sees_background
+    return again
 
 
 def latest(

@@ -47,11 +47,20 @@ def episode_seed(batch_seed: int, episode: int) -> int:
     return int(words[0])
 
 
+def starts_generator(seed: int) -> np.random.Generator:
+    """Draws the testers' starts of the episode with that seed: the first of its generators."""
+    return np.random.default_rng(np.random.SeedSequence(seed).spawn(1)[0])
+
+
 def job(plan: BatchPlan, run: int, memory: tuple[Any, ...] | None = None) -> Job:
-    """The run-th episode of a batch: agents take turns, so run i stays what it is for any N."""
+    """The run-th episode of a batch: agents take turns, so run i stays what it is for any N.
+
+    ``memory``: what earlier episodes taught, unless the plan says what is known in all of them.
+    """
     episode, which = divmod(run, len(plan.agents))
-    seed = episode_seed(plan.seed, episode)
-    return Job(run, labelled(plan.agents[which])[0], seed, memory, plan.trace == "all")
+    seed, label = episode_seed(plan.seed, episode), labelled(plan.agents[which])[0]
+    known = memory if plan.known is None else plan.known.get(label)
+    return Job(run, label, seed, known, plan.trace == "all")
 
 
 def make_agents(plan: BatchPlan, label: str) -> list[Agent]:
@@ -61,13 +70,26 @@ def make_agents(plan: BatchPlan, label: str) -> list[Agent]:
     return [make_agent(name, params) for _ in teams(plan.scenario)]
 
 
-def policy_files(plan: BatchPlan) -> list[Path]:
-    """The files of the agents that are policies."""
-    return [file for name in plan.cast.values() if (file := policy_file(name)) is not None]
+def agent_files(plan: BatchPlan) -> list[Path]:
+    """The files of the agents: those that are policies, and those that their parameters name."""
+    files = []
+    for label, name in plan.cast.items():
+        if (file := policy_file(name)) is not None:
+            files.append(file)
+            continue
+        params = plan.agent_params(label, [p.name for p in parameters_of(name)])
+        files += [
+            Path(str(params[key]))
+            for key in getattr(AGENTS.get(name), "FILES", ())
+            if key in params
+        ]
+    return files
 
 
 def learners(plan: BatchPlan) -> frozenset[str]:
     """The labels of the agents that learn from episode to episode."""
+    if plan.known is not None:
+        return frozenset()
     return frozenset(n for n in plan.cast if any(a.learns for a in make_agents(plan, n)))
 
 

@@ -40,7 +40,8 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from cavsumo.agents.triggers import MAX_DECEL, REACTION_TIME, detour, time_to_walk
+from cavsumo.agents.triggers import MAX_DECEL, REACTION_TIME, time_to_walk
+from cavsumo.bodies import detour
 from cavsumo.kinematics import wrap
 from cavsumo.paths import Projection
 from cavsumo.scene import Scene

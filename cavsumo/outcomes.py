@@ -25,6 +25,10 @@ COLUMNS: Mapping[str, str] = {
     "embodiment": "how SUMO was shown the testers: vehicle or person",
     "sumo_width_m": "width that SUMO was shown of a tester pedestrian",
     "seed": "the episode's seed, derived from the batch's seed and the number of the episode",
+    "forecast": "what the tester said before the episode: sure, undecided or not-forceable; empty "
+    "for agents that say nothing",
+    "forecast_value": "value of its game at the start: 0 where a test is sure, -1 where there is "
+    "none",
     "outcome": "violated, held, not_triggered, unfair, invalid or error",
     "breach": "which tester broke which rule of the world before the verdict, and when: the "
     "one that makes the episode invalid, else the first",

@@ -181,11 +181,17 @@ def replayed(worker: Worker, record: Record) -> Outcome:
     if record.row["reset"] == "shared":
         first = run - run % plan.block
         return search(worker, [job(plan, i) for i in range(first, run + 1)])[-1][0]
-    memory, step = None, len(plan.agents)
+    return worker.play(dataclasses.replace(job(plan, run, known(worker, run)), record=True))[0]
+
+
+def known(worker: Worker, run: int) -> tuple[Any, ...] | None:
+    """What the agents of an episode knew before it; a learner lives through its earlier ones."""
+    plan, memory = worker.setting.plan, job(worker.setting.plan, run).memory
+    step = len(plan.agents)
     learns = job(plan, run).agent in learners(plan)
     for earlier in range(run % step, run, step) if learns else ():
         _, memory = worker.play(job(plan, earlier, memory))
-    return worker.play(dataclasses.replace(job(plan, run, memory), record=True))[0]
+    return memory
 
 
 # Compared

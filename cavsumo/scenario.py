@@ -46,6 +46,9 @@ class Scenario(BaseModel):
         description="background cars and pedestrians drawn for the network: departures per minute "
         "and kilometre of road, each direction counted, and of pavement; instead of routes",
     )
+    traffic_seed: int | None = Field(
+        None, ge=0, le=2**63 - 1, description="seed that it is drawn from, if not the batch's"
+    )
     additional: tuple[Path, ...] = Field((), description="SUMO additional files")
     ego: str = Field(
         "sumo", description="registered ego, module:Class, exec:COMMAND or tcp:HOST:PORT"
@@ -67,6 +70,13 @@ class Scenario(BaseModel):
         False, description="testers start anywhere beside the road, not on pavements only"
     )
     bodies_per_agent: int = Field(1, ge=1, description="bodies that one agent owns")
+    starts_seed: int | None = Field(
+        None,
+        ge=0,
+        le=2**32 - 1,
+        description="seed of an episode whose testers' starts all episodes have; each draws its "
+        "own if not given",
+    )
     start_speed: Finite | None = Field(
         None,
         ge=0,
@@ -151,6 +161,11 @@ class BatchPlan(BaseModel):
         ("timing",), min_length=1, description="names of agents, or LABEL=NAME"
     )
     params: Params = Field(default_factory=dict)
+    known: dict[str, tuple[Any, ...]] | None = Field(
+        None,
+        description="what agents know at the beginning of every episode, by label: then nobody "
+        "learns from one episode for the next",
+    )
     runs: int = Field(100, ge=1, le=10_000_000)
     seed: int = Field(1, ge=0, le=2**63 - 1)
     trace: Literal["none", "tests", "all"] = "tests"

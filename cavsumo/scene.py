@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -25,6 +26,7 @@ class Scene:
         lights: the traffic lights on the ego's path, in the order in which it meets them.
         crossings: the marked pedestrian crossings on the ego's path, likewise.
         limits: the speed limits on the ego's path, likewise.
+        horizon: how long the episode may last [s]; infinite where nobody said.
         seed: of the episode; whoever draws random numbers without a generator starts from it.
     """
 
@@ -38,6 +40,7 @@ class Scene:
     seed: int = 0
     crossings: tuple[MarkedCrossing, ...] = ()
     limits: tuple[Limit, ...] = ()
+    horizon: float = math.inf
     _progress: list[Any] = field(default_factory=lambda: [None, None], repr=False)
     _glimpse: list[Any] = field(default_factory=lambda: [None, None], repr=False)
     _ways: dict[int, Crossing | None] = field(default_factory=dict, repr=False)

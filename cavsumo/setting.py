@@ -24,7 +24,7 @@ from cavsumo.egos import make_ego
 from cavsumo.egos.base import Ego
 from cavsumo.egos.specs import ego_files
 from cavsumo.errors import InputError
-from cavsumo.jobs import check_agents, learners, make_agents, policy_files
+from cavsumo.jobs import agent_files, check_agents, learners, make_agents
 from cavsumo.options import OPTIONS
 from cavsumo.scenario import BatchPlan
 from cavsumo.signals import Pace
@@ -74,6 +74,8 @@ def prepare(plan: BatchPlan, ego: Ego | None = None) -> Setting:
     """
     scenario = plan.scenario
     check_agents(plan)
+    for label in plan.cast:
+        make_agents(plan, label)[0].prepare()
     make_assertions(
         scenario.assertions, scenario.assertion_params, scenario.formulas, scenario.step_length
     )
@@ -107,7 +109,8 @@ def wishes(plan: BatchPlan, kind: Kind, ego: Ego) -> Wishes:
     scenario = plan.scenario
     volume = None
     if scenario.traffic is not None:
-        volume = Volume(*scenario.traffic, duration=scenario.end + BEYOND_S, seed=plan.seed)
+        seed = plan.seed if scenario.traffic_seed is None else scenario.traffic_seed
+        volume = Volume(*scenario.traffic, duration=scenario.end + BEYOND_S, seed=seed)
     return Wishes(
         kind=kind,
         types=scenario.approaches or _types(plan),
@@ -153,7 +156,7 @@ def checksums(plan: BatchPlan) -> dict[str, str]:
     """The SHA-256 of every file that a plan names, those of its ego and assertions among them."""
     scenario = plan.scenario
     files = [scenario.net, *([scenario.routes] if scenario.routes else []), *scenario.additional]
-    files += [*policy_files(plan), *ego_files(scenario.ego)]
+    files += [*agent_files(plan), *ego_files(scenario.ego)]
     files += assertion_files(scenario.assertions)
     return {str(file): checksum(file) for file in files}
 

@@ -5,13 +5,14 @@ The truth about the testers' bodies is integrated here by the kinematics; the wo
 
 from __future__ import annotations
 
+import dataclasses
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
 
-from cavsumo.agents.base import Agent
+from cavsumo.agents.base import Agent, Forecast
 from cavsumo.assertions.base import INVALID, VIOLATED, Assertion, Judgement, weightiest
 from cavsumo.blame import blamed
 from cavsumo.bodies import Action, Kind
@@ -20,6 +21,7 @@ from cavsumo.contacts import ContactMonitor
 from cavsumo.criticality import Course
 from cavsumo.egos.base import Drive, Ego
 from cavsumo.errors import AgentError
+from cavsumo.jobs import starts_generator
 from cavsumo.kinematics import step_floats
 from cavsumo.rewards import Feedback, Ledger
 from cavsumo.roads import Start
@@ -42,7 +44,8 @@ Joint = Sequence[Sequence[Action]]
 class Episode:
     """What happened, while and after it happens.
 
-    Frames and actions only where they are kept; ``drives``: whether the ego steers itself.
+    Frames and actions only where they are kept; ``drives``: whether the ego steers itself;
+    ``forecast``: what the testers said of it beforehand.
     """
 
     judgement: Judgement
@@ -65,6 +68,7 @@ class Episode:
     frames: list[Snapshot] = field(default_factory=list)
     actions: list[Joint] = field(default_factory=list)
     drives: bool = False
+    forecast: Forecast | None = None
 
     @property
     def outcome(self) -> str:
@@ -104,6 +108,7 @@ class Performance:
         self._show(self.snapshot)
         self._ledger = Ledger(self.scene, stage.teams)
         self._episode = Episode(Judgement(""))
+        self._episode.forecast = _foretold(agents, self.agent_views)
         self._umpire = Umpire(self.scene)
         self._history: list[Snapshot] = []  # what the blame is found from
         self._learners = any(type(a).process_feedback is not Agent.process_feedback for a in agents)
@@ -220,12 +225,14 @@ def _reset(
 ) -> tuple[Scene, Snapshot, Senses | None]:
     """Draw the starts and begin an episode; one generator for each who draws."""
     streams = np.random.SeedSequence(seed)
-    placing, electing, *rest = map(np.random.default_rng, streams.spawn(2 + len(agents)))
+    _, electing, *rest = map(np.random.default_rng, streams.spawn(2 + len(agents)))
+    placing = starts_generator(seed if stage.starts_seed is None else stage.starts_seed)
     kinds = [body.kind for body in stage.bodies]
     ego = stage.world.ego_body
     starts = stage.site.draw(kinds, ego.kind, stage.start_speed, placing)
     site = stage.site
     scene = site.scene(stage.world.dt, ego, stage.bodies, starts, seed)
+    scene = dataclasses.replace(scene, horizon=stage.horizon)
     watching: list[Ego | Agent | Assertion] = [stage.ego, *agents, *stage.assertions]
     # Vehicles keep their distance to whoever is ahead of them, so they see everybody.
     driving = any(start.approach for start in starts)
@@ -242,6 +249,12 @@ def _reset(
     for assertion in stage.assertions:
         assertion.reset(scene)
     return scene, snapshot, senses
+
+
+def _foretold(agents: Sequence[Agent], views: Sequence[Snapshot]) -> Forecast | None:
+    """What the agents say of the episode before it: the best that one of them says."""
+    said = [agent.forecast(view) for agent, view in zip(agents, views, strict=True)]
+    return max((one for one in said if one is not None), default=None, key=Forecast.rank)
 
 
 def _senses(stage: Stage, scene: Scene, streams: np.random.SeedSequence) -> Senses | None:

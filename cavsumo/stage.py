@@ -26,6 +26,7 @@ class Stage:
         bodies: the testers' bodies.
         horizon: length of an episode [s].
         start_speed: of the testers [m/s]; None for their maximum.
+        starts_seed: of the episode whose starts all episodes have; None for their own.
         ego_sensor, tester_sensor: what the ego and the agents see the others through; None for
             full observability.
     """
@@ -38,6 +39,7 @@ class Stage:
     bodies: tuple[Body, ...]
     horizon: float
     start_speed: float | None = None
+    starts_seed: int | None = None
     ego_sensor: Sensor | None = None
     tester_sensor: Sensor | None = None
 
@@ -70,6 +72,7 @@ def set_stage(scenario: Scenario, site: Site, ego: Ego | None = None) -> Stage:
         bodies=tester_bodies(scenario),
         horizon=scenario.end,
         start_speed=scenario.start_speed,
+        starts_seed=scenario.starts_seed,
         ego_sensor=scenario.ego_sensor,
         tester_sensor=scenario.tester_sensor,
     )

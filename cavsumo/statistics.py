@@ -45,6 +45,23 @@ def rate(count: int, total: int, method: Literal["wilson", "exact"] = "wilson") 
     return Rate(count, total, count / total, float(interval.low), float(interval.high))
 
 
+def lower_bound(count: int, total: int, confidence: float) -> float:
+    """The probability p below which so many successes are less likely than 1 - confidence.
+
+    One-sided, by Clopper and Pearson (1934, Biometrika 26, 404)::
+
+        P(X >= count | p) = 1 - confidence,   X ~ Bin(total, p);   0 for count = 0
+
+    With a number of trials fixed before, the bound lies above the true probability at most so
+    often as 1 - confidence, whatever that probability is.
+    """
+    if count == 0:
+        return 0.0
+    from scipy.special import betaincinv
+
+    return float(betaincinv(count, total - count + 1, 1.0 - confidence))
+
+
 def sequential_rate(count: int, total: int, level: float = 0.95) -> Rate:
     """The share of count among total, with an interval that holds however one decides to stop.
 

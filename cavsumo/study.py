@@ -150,10 +150,10 @@ def _choice(key: str, option: Any, file: Path, place: str) -> Choice:
             f"name, got {option!r}"
         )
     settings = settings_in({key: option}, file, f"config {str(file)!r}: {VARY}")
-    return Choice(_name_of(key, option), settings)
+    return Choice(part_name(key, option), settings)
 
 
-def _name_of(key: str, value: bool | int | float | str) -> str:
+def part_name(key: str, value: bool | int | float | str) -> str:
     """What a batch with this value is called: ``testers3``, ``signal-red``."""
     text = str(value).lower() if isinstance(value, bool) else str(value)
     if key in PATH_KEYS:

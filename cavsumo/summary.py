@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
 
 from rich.console import Console
 from rich.measure import Measurement
 from rich.table import Table
 
+from cavsumo.agents.base import VERDICTS
 from cavsumo.assertions.base import HELD, INVALID, UNFAIR, VIOLATED
 from cavsumo.outcomes import cell, is_failure
 from cavsumo.references import REFERENCES
@@ -30,6 +32,7 @@ class Ended:
             hold however it was decided to stop.
         shared: episodes shared simulations, and those played in a fresh one are found tests.
         cut_short: somebody stopped it.
+        promises: by agent, against whom its forecasts hold.
     """
 
     name: str
@@ -39,6 +42,7 @@ class Ended:
     sequential: bool = False
     shared: bool = False
     cut_short: bool = False
+    promises: Mapping[str, str] = field(default_factory=dict)
 
 
 def summarise(ended: Sequence[Ended]) -> None:
@@ -62,6 +66,7 @@ def summarise(ended: Sequence[Ended]) -> None:
     )
     _say_invalid(ended, console)
     for one in ended:
+        _say_forecasts(one, console)
         _say_preventable(one, console)
     _say_errors(ended, console)
     if not together.failures and together.tests:
@@ -178,6 +183,22 @@ def _cells(found: Found, sequential: bool, invalid: bool) -> list[str]:
         str(found.errors),
         "" if median is None else f"{median:.1f} s",
     ]
+
+
+def _say_forecasts(one: Ended, console: Console) -> None:
+    """How many starts an agent said to be sure and not forceable, and what became of them."""
+    for agent, found in one.tally.agents.items():
+        said = {verdict: found.forecasts.get(verdict, Counter()) for verdict in VERDICTS}
+        if found.forecasts:
+            sure, open_, lost = said.values()
+            total = sum(count.total() for count in said.values())
+            _say(
+                console,
+                (f"{one.name}: " if one.name else "")
+                + f"{agent}: of {total} starts {sure.total()} are sure, {open_.total()} undecided, "
+                f"{lost.total()} not forceable against {one.promises.get(agent, 'its egos')}; "
+                f"tests in {sure[True]}, {open_[True]} and {lost[True]} of them",
+            )
 
 
 def _say_preventable(one: Ended, console: Console) -> None:

@@ -25,6 +25,7 @@ class Found:
         times: when tests were triggered, by time [s] to three decimals.
         verdicts: for each assertion, how often it said what.
         preventable: failures that the reference driver would have avoided (True) or not (False).
+        forecasts: by what was said before the episode, in how many there was a test (True) or not.
     """
 
     outcomes: Counter[str] = field(default_factory=Counter)
@@ -32,6 +33,7 @@ class Found:
     times: Counter[float] = field(default_factory=Counter)
     verdicts: dict[str, Counter[str]] = field(default_factory=dict)
     preventable: Counter[bool] = field(default_factory=Counter)
+    forecasts: dict[str, Counter[bool]] = field(default_factory=dict)
 
     @property
     def episodes(self) -> int:
@@ -104,6 +106,8 @@ class Tally:
         found.fresh += row.get("reset") == "fresh"
         for name, verdict in verdicts_of(row).items():
             found.verdicts.setdefault(name, Counter())[verdict] += 1
+        if row.get("forecast"):
+            found.forecasts.setdefault(row["forecast"], Counter())[is_test(row)] += 1
         if is_test(row):
             found.times[float(cell(row["trigger_time_s"]))] += 1
             self.first.setdefault("test", row)

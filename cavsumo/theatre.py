@@ -51,6 +51,8 @@ class Theatre:
         except EgoError:
             if strict:
                 raise
+        for label in self.plan.cast:
+            make_agents(self.plan, label)[0].prepare()
         simulation: Simulation = "own" if self.plan.reset == "fresh" else "new"
         self.stage.world.reset(episode_seed(self.plan.seed, 0), (), (), simulation=simulation)
 
@@ -124,7 +126,10 @@ def measured(episode: Episode) -> Row:
         judgement = Judgement("", INVALID, episode.breach.tester)
     ttc, drac, pet = episode.course.extremes()
     with_ego = {pair for pair in episode.sumo_collisions if "ego" in pair}
+    forecast = episode.forecast
     return {
+        "forecast": forecast.verdict if forecast else "",
+        "forecast_value": forecast.value if forecast else None,
         "outcome": judgement.verdict,
         "breach": str(episode.breach or ""),
         "blame": episode.blame,

@@ -29,8 +29,9 @@ FORMAT = "cavsumo-trace-1"
 FRAME_KEYS = {"step", "time_s", "ego", "steering", "testers", "background"}
 # Columns that a replay does not reproduce: real time, and the file beside the row.
 NOT_REPLAYED = ("wall_s", "trace")
-# Settings that say how a batch is played and kept and not what its episodes are.
-MANNER = EXTENT | {"shard", "trace", "reset"}
+# Settings that say how a batch is played and kept and not what its episodes are; what is known is
+# the memory in the head.
+MANNER = EXTENT | {"shard", "trace", "reset", "known"}
 MEMORY_MOST = 100_000  # characters of what an agent knew; one that knew more is not kept
 
 

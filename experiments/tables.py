@@ -23,7 +23,7 @@ from cavsumo.statistics import rate
 from cavsumo.summary import interval, percent
 
 HERE = Path(__file__).resolve().parent
-PLACES = ("straight", "crossing", "junction")
+PLACES = ("straight", "crossing", "timegap", "junction")
 # What they call our testers.
 THEIRS = {
     "random": "random",
@@ -43,15 +43,14 @@ def main() -> None:
     parser.add_argument("results", nargs="+", type=Path)
     files = parser.parse_args().results
     report = analyse(sorted(files, key=cell_of))
-    text = (HERE / "README.md").read_text(encoding="utf-8")
-    for name, lines in (
-        ("rates", rates(report)),
-        ("peers", beside_peers(report, peers())),
-        ("ratios", ratios(report)),
-        ("learning", learning(report)),
-    ):
-        text = replaced(text, name, lines)
-    (HERE / "README.md").write_text(text, encoding="utf-8")
+    write_tables(
+        {
+            "rates": rates(report),
+            "peers": beside_peers(report, peers()),
+            "ratios": ratios(report),
+            "learning": learning(report),
+        }
+    )
     (HERE / "agency.csv").write_text(figures(report), encoding="utf-8")
 
 
@@ -220,6 +219,14 @@ def headed(titles: Sequence[str]) -> Iterator[str]:
 def line(cells: Iterable[str]) -> str:
     """A line of a Markdown table."""
     return f"| {' | '.join(cells)} |"
+
+
+def write_tables(tables: Mapping[str, Iterable[str]]) -> None:
+    """Put tables at their places in README.md."""
+    text = (HERE / "README.md").read_text(encoding="utf-8")
+    for name, lines in tables.items():
+        text = replaced(text, name, lines)
+    (HERE / "README.md").write_text(text, encoding="utf-8")
 
 
 def replaced(text: str, name: str, lines: Iterable[str]) -> str:

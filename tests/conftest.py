@@ -41,6 +41,14 @@ Pose = tuple[float, float, float]  # x, y [m], o [rad]
 State = tuple[float, float, float, float]  # x, y [m], v [m/s], o [rad]
 
 
+@pytest.fixture(scope="session", autouse=True)
+def _own_cache(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
+    """Solutions of games are kept for these tests only."""
+    with pytest.MonkeyPatch.context() as patched:
+        patched.setenv("XDG_CACHE_HOME", str(tmp_path_factory.mktemp("cache")))
+        yield
+
+
 @pytest.fixture(scope="session")
 def networks() -> dict[str, Path]:
     """The three networks that come with cavsumo: crossing, junction, pedestrians."""

@@ -223,6 +223,7 @@ def test_a_dask_worker_that_is_killed_loses_nothing(
     assert file_rows(Path("results.csv")) == quiet_rows(quiet)
 
 
+@pytest.mark.slow
 def test_a_cluster_that_goes_in_mid_batch_keeps_the_rows(
     quiet: list[Any],
     dask_words: Callable[[Any], list[str]],

@@ -173,17 +173,19 @@ def test_the_ring_is_the_one_of_the_rules(ring: Game) -> None:
 
 
 def test_the_compiled_loops_are_the_same(ring: Game, monkeypatch: pytest.MonkeyPatch) -> None:
-    """The numba kernel and numpy find the same bounds, each certified."""
+    """With numba and without: the same regions, moves and all, and bounds that agree."""
     pytest.importorskip("numba")
-    from cavsumo.games import plays
+    from cavsumo.games import compiled
 
-    plain = solve(ring)
-    monkeypatch.setattr(plays, "COMPILED", 0)
     for reading in (Reading.A, Reading.C):
-        monkeypatch.setattr(plays, "COMPILED", 0)
+        monkeypatch.setattr(compiled, "COMPILED", 0)
         fast = solve(ring, reading)
-        monkeypatch.setattr(plays, "COMPILED", math.inf)
+        monkeypatch.setattr(compiled, "COMPILED", math.inf)
         plain = solve(ring, reading)
+        for name in ("proper", "sure"):
+            one, other = (getattr(found.verdict, name) for found in (fast, plain))
+            assert (one.layer == other.layer).all()
+            assert (one.moves == other.moves).all()
         assert holds(ring, fast.certificate)
         assert fast.lower == pytest.approx(plain.lower, abs=1e-6)
 

@@ -98,6 +98,21 @@ def test_a_mistake_gets_one_sentence(
     assert [f.name for f in tmp_path.iterdir()] == ["geometric.json"]
 
 
+def test_a_long_solution_says_what_it_does(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """A line now and then on stderr, with the seconds so far; none with --quiet."""
+    monkeypatch.setattr("cavsumo.commands.game.EVERY_S", 0.001)
+    words = ["game", "solve", write("pursuit_line_7", tmp_path), "--reading", "B", "--json"]
+    assert main(words) == 0
+    lines = capsys.readouterr().err.splitlines()
+    assert lines
+    assert all(line.startswith("solving") and line.endswith(" s") for line in lines)
+    assert any("residual" in line for line in lines)
+    assert main([*words, "--quiet"]) == 0
+    assert capsys.readouterr().err == ""
+
+
 def test_a_precision_beyond_floats_is_said(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

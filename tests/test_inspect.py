@@ -7,7 +7,6 @@ import json
 import os
 import subprocess
 import sys
-import time
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -329,14 +328,12 @@ def test_an_unknown_junction_suggests_the_nearest(
 
 
 @needs_netconvert
-def test_a_town_is_inspected_in_seconds(grid: Path) -> None:
+def test_a_town_is_inspected(grid: Path) -> None:
     """2,024 edges: read, ranked, three junctions looked at; run would choose the first."""
-    began = time.process_time()
     network = read_network(grid)
     found = facts(network)
     here = ground(network, HALF_M)
     best = best_junctions(here, 3)
-    assert time.process_time() - began < 30.0  # 6 s on the developers' machine
     assert (found.edges, found.junctions, len(best)) == (2024, 529, 3)
     route, _ = best_route(network, here.roads, None, HALF_M)
     assert route.edges == best[0].ways[0].route.edges

@@ -17,9 +17,11 @@ PACKAGE = Path(cavsumo.__file__).parent
 # From the ground up: a module uses only what stands before it, lazily or not.
 ORDER = """
     cavsumo errors checks registry imports processes
-    games.model games.build games.files games.readings games.regions games.components
-    games.solvable games.policies games.chains games.evaluation games.proper games.certificate
-    games.flow games.arena games.kernel games.backups games.matrix_games games.pairs games.plays
+    games.compiled games.compiled.graphs games.compiled.systems
+    games.model games.build games.files games.readings games.parts games.rises games.regions
+    games.components games.solvable games.policies games.chains games.evaluation games.proper
+    games.certificate games.flow games.arena games.compiled.bellman games.backups
+    games.matrix_games games.pairs games.plays
     games.solve games games.drawing games.pictures
     kinematics geometry paths bodies snapshot fairness roads sumo_poses background
     metrics.following metrics.rss metrics.highway_code metrics.zones metrics.plane
@@ -27,8 +29,13 @@ ORDER = """
     network ego_routes lane_chains approaches starts vehicle_starts kerbs signals trips traffic
     route_rules scene site sight sensors
     osm handedness netconvert facts surfaces inspection layers picture
+    abstraction.coordinates abstraction.classes abstraction.rules abstraction.lattice
+    abstraction.solved abstraction.outlook abstraction.opponent abstraction.response
+    abstraction.solving abstraction
     agents.base agents.walking agents.driving agents.triggers agents.random agents.features
-    agents.manoeuvres agents.behaviours agents.programmed agents.election agents.qlearning agents
+    agents.manoeuvres agents.behaviours agents.programmed agents.election agents.qlearning
+    agents.tactics agents.rehearsal agents.expectiminimax agents.best_response agents.recorded
+    agents
     observations policies agents.policy
     ego_observations
     contacts conduct criticality
@@ -50,7 +57,7 @@ ORDER = """
     envs.spaces envs.puppets envs.settings envs.events envs.episodes envs.elsewhere_process
     envs.elsewhere envs.painting envs.base envs.tester envs.ego envs.parallel envs.discrete envs
     statistics tally stopping results recorder learning progress session checked
-    summary interrupts replays listings fcd gui
+    summary interrupts replays seeds subjects opponents certificate listings fcd gui
     pages.shell pages player.packing player.curves player.scenery player.facts player.page player
     report report.load report.grouping report.rates report.pairs report.compare report.survival
     report.effort report.events report.distinct report.analysis report.cells report.tables
@@ -60,8 +67,9 @@ ORDER = """
     testing.scripts testing.ego_checks testing.agent_checks testing.assertion_checks
     testing.contracts testing
     commands commands.run commands.replay commands.merge commands.report commands.inspect
-    commands.import_osm commands.check_ego commands.game
-    cli_settings cli_egos cli_networks cli_results cli_games cli __main__
+    commands.import_osm commands.check_ego commands.game commands.certify
+    cli_settings cli_egos cli_networks cli_results cli_games cli_certify
+    cli __main__
 """.split()
 
 HEAVY = {"numpy", "pandas", "scipy", "shapely", "libsumo", "sumolib", "pydantic", "rich"}

@@ -179,6 +179,7 @@ def play(
 # Killed -------------------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 def test_a_batch_killed_again_and_again_is_the_one_that_was_not(
     quiet: Path, words: list[str], tmp_path: Path
 ) -> None:

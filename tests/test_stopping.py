@@ -210,7 +210,7 @@ def test_the_command_line_stops_goes_on_and_says_that_the_intervals_are_valid(
     assert main([*words, "--first"]) == 1
     assert "confidence sequences, valid whenever one stops" in capsys.readouterr().out
     stopped = (tmp_path / "results.csv").read_bytes()
-    assert stopped.count(b"violated") == 1
+    assert stopped.count(b",violated,") == 1
     assert main(["run", "--resume"]) == 1
     assert "confidence sequences, valid whenever one stops" in capsys.readouterr().out
     assert (tmp_path / "results.csv").read_bytes() == stopped

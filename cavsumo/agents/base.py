@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Any, ClassVar
+from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 
@@ -11,6 +11,24 @@ from cavsumo.bodies import NOOP, Action, Kind
 from cavsumo.registry import Registry
 from cavsumo.scene import Scene
 from cavsumo.snapshot import BodyState, Snapshot
+
+VERDICTS = SURE, UNDECIDED, NOT_FORCEABLE = "sure", "undecided", "not-forceable"
+
+
+class Forecast(NamedTuple):
+    """What an agent says of an episode before it is played.
+
+    Attributes:
+        verdict: SURE, UNDECIDED or NOT_FORCEABLE: whether it brings about a test.
+        value: of its game where the episode starts: 0 for a test, -1 for none.
+    """
+
+    verdict: str
+    value: float
+
+    def rank(self) -> tuple[int, float]:
+        """The larger, the better for the tester."""
+        return -VERDICTS.index(self.verdict), self.value
 
 
 class Agent:
@@ -22,12 +40,15 @@ class Agent:
         sees_background: whether it looks at the background traffic. Set False where it does not:
             when nobody in an episode does, far bodies are left out of the snapshots.
         drives: whether its bodies may be vehicles. Set False where it can only walk.
+        FILES: its parameters that name files; their checksums are noted with the results.
     """
 
     PARAMETERS: ClassVar[Mapping[str, str]] = {}
+    FILES: ClassVar[tuple[str, ...]] = ()
     learns: bool = False  # whether episodes change what it knows: then they are played in sequence
     sees_background: bool = True
     drives: bool = True
+    promise: str = ""  # against whom its forecasts hold; empty for agents that make none
 
     scene: Scene
     owned: tuple[int, ...]
@@ -36,12 +57,22 @@ class Agent:
     def check_bodies(self, kind: Kind, bodies: int) -> None:
         """Raise ValueError unless the agent can own so many bodies of a kind."""
 
+    def prepare(self) -> None:
+        """Do once what would take long in an episode; called before any, in every process."""
+
     def reset(self, scene: Scene, owned: Sequence[int], rng: np.random.Generator) -> None:
         """Begin an episode with the bodies ``scene.bodies[i] for i in owned``.
 
         The generator belongs to this agent for this episode; nobody else draws from it.
         """
         self.scene, self.owned, self.rng = scene, tuple(owned), rng
+
+    def forecast(self, snapshot: Snapshot) -> Forecast | None:
+        """Whether this episode brings about a test; called once, before the first action.
+
+        None for agents that do not know.
+        """
+        return None
 
     def choose_action(self, snapshot: Snapshot) -> tuple[Action, ...]:
         """An action for each owned body, in their order (seed, ChooseAction)."""
@@ -85,3 +116,10 @@ class NoopAgent(Agent):
     """Does nothing: its bodies keep their speed and direction (the seed's noop)."""
 
     sees_background = False
+
+
+def learner_of(learned: Mapping[str, Any], name: str) -> Any:
+    """What the learner of a batch knows, by its manifest: that without a label, or the only one."""
+    if name not in learned and len(learned) == 1:
+        return next(iter(learned.values()))
+    return learned[name]

@@ -19,7 +19,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from cavsumo.agents.base import AGENTS, Agent
+from cavsumo.agents.base import AGENTS, Agent, learner_of
 from cavsumo.agents.features import FEATURES, TARGETS, Features, towards
 from cavsumo.bodies import Action
 from cavsumo.checks import number, truth
@@ -33,6 +33,7 @@ class QLearningAgent(Agent):
 
     sees_background = False
     drives = False
+    FILES = ("weights",)
 
     PARAMETERS: ClassVar[Mapping[str, str]] = {
         "alpha": "learning rate in the first episode (0..1]",
@@ -146,7 +147,7 @@ def load_weights(file: Path) -> list[float]:
     try:
         data = json.loads(file.read_text(encoding="utf-8"))
         if "learned" in data:  # the manifest of a batch
-            data = _learner(data["learned"])[0]
+            data = learner_of(data["learned"], "q-learning")[0]
         weights = [number(name, data["weights"][name]) for name in FEATURES]
     except OSError as error:
         raise ValueError(f"weights {str(file)!r}: {error.strerror}") from error
@@ -158,10 +159,3 @@ def load_weights(file: Path) -> list[float]:
     if not all(math.isfinite(w) for w in weights):
         raise ValueError(f"weights {str(file)!r}: every weight must be finite")
     return weights
-
-
-def _learner(learned: Mapping[str, Any]) -> Any:
-    """What the learner of a batch knows: that of no label, or the only one."""
-    if "q-learning" not in learned and len(learned) == 1:
-        return next(iter(learned.values()))
-    return learned["q-learning"]

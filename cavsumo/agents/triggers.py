@@ -5,9 +5,8 @@ from __future__ import annotations
 import math
 from typing import Protocol
 
-from cavsumo.agents.walking import turn_radius
-from cavsumo.bodies import Kind
-from cavsumo.kinematics import wrap
+from cavsumo.abstraction.coordinates import meeting
+from cavsumo.bodies import Kind, detour
 from cavsumo.roads import Crossing
 from cavsumo.scene import Scene
 from cavsumo.snapshot import BodyState, Snapshot
@@ -62,16 +61,13 @@ class Timing:
     def __init__(self, scene: Scene, index: int, aim: float) -> None:
         self.scene, self.aim = scene, aim
         self.ego_half = scene.ego.kind.length / 2
-        start, kind = scene.starts[index], scene.bodies[index].kind
-        self.way = scene.way(index)
-        meeting = scene.ego_path.meet(start.x, start.y, self.way.heading) if self.way else None
-        self.meeting = None if meeting is None else meeting[1]
+        met = meeting(scene, index)
+        self.way = met.way if met else None
+        self.meeting = met.along if met else None
+        self.strip = met.strip if met else 0.0
         self.point = scene.ego_path.at(self.meeting or 0.0)[:2]
         self._projected = (math.inf, 0.0, 0.0)  # where the ego was, and how far from its path
         self._last: tuple[BodyState, float | None] | None = None
-        # How far along its way the body's front touches the strip that the ego sweeps.
-        reach = meeting[0] if meeting else 0.0
-        self.strip = reach - scene.ego.kind.width / 2 - kind.length / 2
 
     def __call__(self, snapshot: Snapshot, state: BodyState) -> bool:
         v = snapshot.ego.v
@@ -137,14 +133,3 @@ def time_to_walk(kind: Kind, v: float, distance: float) -> float:
     if gaining >= distance:
         return (math.sqrt(v * v + 2.0 * a * distance) - v) / a
     return (top - v) / a + (distance - gaining) / top
-
-
-def detour(kind: Kind, o: float, heading: float) -> float:
-    """How much longer the way gets by turning to a heading first, at full steering [m].
-
-    A body turning by phi on the radius R = b / (2 sin beta) walks R phi and gains R sin phi.
-    """
-    if heading == o:
-        return 0.0
-    phi = abs(wrap(heading - o))
-    return turn_radius(kind) * (phi - math.sin(phi))

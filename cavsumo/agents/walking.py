@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 
-from cavsumo.bodies import Action, Kind
+from cavsumo.bodies import Action, Kind, turn_radius
 from cavsumo.kinematics import steering_for_turn, wrap
 from cavsumo.roads import Crossing
 from cavsumo.scene import Scene
@@ -23,11 +23,6 @@ PAVEMENT_GAIN = 0.5  # how strongly a walker returns to its line on the pavement
 def turn_limit(kind: Kind, v: float, dt: float) -> float:
     """The largest turn that full steering makes in one timestep (seed, eq. 15) [rad]."""
     return 2.0 * v * dt / kind.wheelbase * kind.turning
-
-
-def turn_radius(kind: Kind) -> float:
-    """Radius of the circle on which a body turns at full steering, b / (2 sin beta) [m]."""
-    return kind.wheelbase / (2.0 * kind.turning)
 
 
 def room_to_turn(kind: Kind, turn: float) -> float:
@@ -142,13 +137,13 @@ class Stroll:
 
 
 class ApproachKerb:
-    """Go straight to the kerb and wait there, facing the road."""
+    """Go straight to the kerb and wait there, facing the road, at a distance from it [m]."""
 
-    def __init__(self, scene: Scene, index: int) -> None:
+    def __init__(self, scene: Scene, index: int, clearance: float = KERB_CLEARANCE_M) -> None:
         self.dt = scene.dt
         self.way = scene.way(index)
         kind = scene.bodies[index].kind
-        self.stop = (self.way.enter if self.way else 0.0) - kind.length / 2 - KERB_CLEARANCE_M
+        self.stop = (self.way.enter if self.way else 0.0) - kind.length / 2 - clearance
         self.turning = False
         self._last: tuple[BodyState, Action] | None = None
 

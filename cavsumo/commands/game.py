@@ -7,6 +7,7 @@ import io
 import json
 import math
 import sys
+import threading
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -15,6 +16,7 @@ from typing import Any
 
 import numpy as np
 from rich.console import Console
+from rich.progress import Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
 from rich.table import Table
 from rich.text import Text
 
@@ -62,9 +64,10 @@ def solve_file(order: Order) -> int:
     if not (math.isfinite(order.precision) and order.precision > 0):
         raise InputError(f"--precision: expected a positive number, got {order.precision:g}")
     painters = _painters(order)
-    game = read_game(order.file)
     try:
         with _progress(order.quiet) as tell:
+            tell("reading the file", math.inf)
+            game = read_game(order.file)
             found = solve(game, order.reading, order.precision, trim=order.trim, tell=tell)
         verdict, solution = found.verdict, found
     except Unsolvable as error:
@@ -121,22 +124,39 @@ def _progress(quiet: bool) -> Iterator[Tell]:
     if quiet:
         yield lambda _, __: None
     elif sys.stderr.isatty():
-        with Console(stderr=True).status("solving") as status:
-            yield lambda doing, left: status.update(_said(doing, left))
+        columns = (SpinnerColumn(), TextColumn("{task.description}"), TimeElapsedColumn())
+        with Progress(*columns, console=Console(stderr=True), transient=True) as shown:
+            task = shown.add_task("solving", total=None)
+            yield lambda doing, left: shown.update(task, description=_said(doing, left))
     else:
-        last = time.monotonic()
+        with _lines() as tell:
+            yield tell
 
-        def tell(doing: str, left: float) -> None:
-            nonlocal last
-            if time.monotonic() - last > EVERY_S:
-                last = time.monotonic()
-                print(_said(doing, left), file=sys.stderr)
 
+@contextmanager
+def _lines() -> Iterator[Tell]:
+    """A line every EVERY_S with the seconds so far, also while one thing takes longer than that."""
+    begun, over, said = time.monotonic(), threading.Event(), "solving"
+
+    def tell(doing: str, left: float) -> None:
+        nonlocal said
+        said = _said(doing, left)
+
+    def speak() -> None:
+        while not over.wait(EVERY_S):
+            print(f"{said}, {time.monotonic() - begun:.0f} s", file=sys.stderr, flush=True)
+
+    speaker = threading.Thread(target=speak, daemon=True)
+    speaker.start()
+    try:
         yield tell
+    finally:
+        over.set()
+        speaker.join()
 
 
 def _said(doing: str, left: float) -> str:
-    """A line of progress."""
+    """What is being done, in words."""
     return f"solving: {doing}" + (f", residual {left:.1e}" if math.isfinite(left) else "")
 
 

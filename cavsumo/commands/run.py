@@ -13,6 +13,7 @@ from cavsumo.egos import make_ego
 from cavsumo.errors import CavsumoError, Exit, InputError
 from cavsumo.executors import Means, opened
 from cavsumo.interrupts import Interrupts
+from cavsumo.jobs import make_agents
 from cavsumo.recorder import Recorder
 from cavsumo.session import Session
 from cavsumo.setting import Setting
@@ -29,7 +30,14 @@ def run(settings: Mapping[str, Any], output: Path, means: Means, manner: Manner)
 
 def run_study(parts: Sequence[Part], output: Path, means: Means, manner: Manner) -> int:
     """Play one batch after another; all are checked before anything is written."""
-    batches = checked(parts, output, manner)
+    ended, interrupted = played(checked(parts, output, manner), means, manner)
+    if not manner.quiet:
+        summarise(ended)
+    return exit_status(ended, interrupted, manner.exit_zero)
+
+
+def played(batches: Sequence[Checked], means: Means, manner: Manner) -> tuple[list[Ended], bool]:
+    """Play batches that were checked; what they came to, and whether that was cut short."""
     ended: list[Ended] = []
     with opened(means) as (executor, jobs), Interrupts(manner.quiet) as interrupts:
         for batch in batches:
@@ -38,10 +46,8 @@ def run_study(parts: Sequence[Part], output: Path, means: Means, manner: Manner)
             if interrupts() and ended:
                 break
             ended.append(_play(batch, executor, jobs, interrupts, manner))
-    if not manner.quiet:
-        summarise(ended)
     cut_short = len(ended) < len(batches) or any(one.cut_short for one in ended)
-    return _exit_status(ended, interrupts() and cut_short, manner.exit_zero)
+    return ended, interrupts() and cut_short
 
 
 def _rehearse(executor: Executor, setting: Setting) -> None:
@@ -76,6 +82,7 @@ def _play(
         sequential=looks_at_rows(setting.plan),
         shared=setting.plan.reset == "shared",
         cut_short=session.cut_short or session.status == "interrupted",
+        promises={n: make_agents(setting.plan, n)[0].promise for n in setting.plan.cast},
     )
 
 
@@ -92,7 +99,7 @@ def _carry_out(session: Session, manner: Manner) -> None:
         session.end()
 
 
-def _exit_status(ended: Sequence[Ended], interrupted: bool, exit_zero: bool) -> int:
+def exit_status(ended: Sequence[Ended], interrupted: bool, exit_zero: bool) -> int:
     """130 interrupted, 3 an episode could not be run, 1 the ego violated an assertion, else 0."""
     if interrupted:
         return Exit.INTERRUPTED

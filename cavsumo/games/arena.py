@@ -17,8 +17,9 @@ import numpy as np
 import numpy.typing as npt
 
 from cavsumo.games.model import Bools, Floats, Game, Ints
+from cavsumo.games.parts import gathered, spans, starts
 from cavsumo.games.readings import Reading
-from cavsumo.games.regions import spans
+from cavsumo.games.rises import rises
 
 BLOCK = 128  # states that are swept at a time, at least
 
@@ -46,6 +47,7 @@ class Arena:
         successor: of each outcome, m for goals, int32.
         probability: of each outcome.
         reward: of each cell.
+        fast: whether compiled loops are used.
     """
 
     reading: Reading
@@ -57,6 +59,7 @@ class Arena:
     successor: npt.NDArray[np.int32]
     probability: Floats
     reward: Floats
+    fast: bool
 
     @property
     def size(self) -> int:
@@ -74,12 +77,32 @@ class Arena:
         return np.repeat(np.arange(self.size), np.diff(self.state_group))
 
     @cached_property
+    def cell_state(self) -> Ints:
+        """The state of each cell."""
+        return self.group_state[self.cell_group]
+
+    def rises(self, value: Floats) -> Floats:
+        """r + sum of p V(s') - V(s) of every cell."""
+        parts = (self.cell_outcome, self.successor, self.probability, self.reward, self.cell_state)
+        return rises(*parts, value, self.fast)[0]
+
+    @cached_property
     def matrix(self) -> Any:
         """Transitions, cells by states and, last, the goals."""
         from scipy.sparse import csr_matrix
 
         parts = (self.probability, self.successor, self.cell_outcome)
         return csr_matrix(parts, shape=(len(self.cells), self.size + 1))
+
+    def transitions(self, cells: Ints) -> Any:
+        """Those of one cell a state, as a square CSR matrix; the last state is the goals'."""
+        from scipy.sparse import csr_matrix
+
+        here = np.arange(self.size + 1, dtype=np.int32)
+        parts = (self.cell_outcome, self.successor, self.probability)
+        start, to, chance = gathered(*parts, cells, here, self.fast)
+        square = (self.size + 1, self.size + 1)
+        return csr_matrix((chance, to, np.append(start, start[-1])), shape=square)
 
     @cached_property
     def blocks(self) -> list[Block]:
@@ -96,8 +119,8 @@ def arena(game: Game, reading: Reading, live: Ints, kept: Bools | None = None) -
         order, start, groups = game.replies
     else:
         order, start, groups = np.arange(game.n_cells), game.cell_start, game.row_start
-    group = spans(groups, live)
-    place = spans(start, group)
+    group = spans(groups, live, game.fast)
+    place = spans(start, group, game.fast)
     group_size, state_size = np.diff(start)[group], np.diff(groups)[live]
     cells = order[place]
     if kept is not None:
@@ -109,22 +132,21 @@ def arena(game: Game, reading: Reading, live: Ints, kept: Bools | None = None) -
         group_size, state_size = group_size[some], np.bincount(state, minlength=len(live))
     number = np.full(game.n_states, len(live), dtype=np.int32)
     number[live] = np.arange(len(live))
-    outcome = spans(game.outcome_start, cells)
+    begin, successor, probability = gathered(
+        game.outcome_start, game.successor, game.probability, cells, number, game.fast
+    )
     return Arena(
         Reading.C if ego_first else Reading.A,
         live,
         cells,
-        _starts(state_size),
-        _starts(group_size),
-        _starts(np.diff(game.outcome_start)[cells]),
-        number[game.successor[outcome]],
-        game.probability[outcome],
+        starts(state_size),
+        starts(group_size),
+        begin,
+        successor,
+        probability,
         game.reward[cells],
+        game.fast,
     )
-
-
-def _starts(sizes: Ints) -> Ints:
-    return np.concatenate(([0], np.cumsum(sizes)))
 
 
 def _block(a: Arena, first: int, last: int) -> Block:

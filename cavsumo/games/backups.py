@@ -10,14 +10,15 @@ import numpy as np
 
 from cavsumo.games.arena import Arena, Block
 from cavsumo.games.model import Floats, Ints
+from cavsumo.games.parts import firsts
 from cavsumo.games.readings import Reading
 
 
-def sweep(arena: Arena, value: Floats, shift: float) -> None:
+def sweep(arena: Arena, value: Floats, shift: Floats) -> None:
     """One Gauss-Seidel sweep of V <- T V + shift in place, block by block."""
     outer, inner = _operators(arena)
     for block in arena.blocks:
-        value[block.states] = _swept(arena, block, value, outer, inner) + shift
+        value[block.states] = _swept(arena, block, value, outer, inner) + shift[block.states]
 
 
 def _operators(arena: Arena) -> tuple[np.ufunc, np.ufunc]:
@@ -38,25 +39,21 @@ def _swept(arena: Arena, block: Block, value: Floats, outer: np.ufunc, inner: np
 
 
 def backup(arena: Arena, value: Floats) -> tuple[Floats, Ints]:
-    """T V, with its 0 for the goals, and for each state the cell that attains it."""
+    """T V - V, with its 0 for the goals, and for each state the cell that attains T V."""
     outer, inner = _operators(arena)
-    q = arena.matrix @ value + arena.reward
-    answer = inner.reduceat(q, arena.group_cell[:-1])
+    rise = arena.rises(value)
+    answer = inner.reduceat(rise, arena.group_cell[:-1])
     best = outer.reduceat(answer, arena.state_group[:-1])
-    group = _first(answer == best[arena.group_state], arena.state_group)
-    cell = _first(q == answer[arena.cell_group], arena.group_cell)
+    group = firsts(np.flatnonzero(answer == best[arena.group_state]), arena.group_state)
+    cell = firsts(np.flatnonzero(rise == answer[arena.cell_group]), arena.cell_group)
     return np.append(best, 0.0), cell[group]
 
 
 def answers(arena: Arena, value: Floats) -> Ints:
     """For each group the cell that the one who answers takes."""
+    if len(arena.group_cell) - 1 == len(arena.cells):
+        return np.arange(len(arena.cells))  # no choice
     _, inner = _operators(arena)
-    q = arena.matrix @ value + arena.reward
-    best = inner.reduceat(q, arena.group_cell[:-1])
-    return _first(q == best[arena.cell_group], arena.group_cell)
-
-
-def _first(true: np.ndarray, start: Ints) -> Ints:
-    """The place of the first true entry of each part; every part has one."""
-    places = np.flatnonzero(true)
-    return places[np.searchsorted(places, start[:-1])]
+    rise = arena.rises(value)
+    best = inner.reduceat(rise, arena.group_cell[:-1])
+    return firsts(np.flatnonzero(rise == best[arena.cell_group]), arena.cell_group)

@@ -29,6 +29,7 @@ import numpy as np
 from cavsumo.games.components import EPSILON, magnitude
 from cavsumo.games.model import Bools, Floats, Game, GameError, Ints
 from cavsumo.games.readings import Reading
+from cavsumo.games.rises import rises
 
 
 @dataclass(frozen=True, eq=False)
@@ -65,7 +66,7 @@ def lower_holds(game: Game, reading: Reading, lower: Floats, tester: Floats) -> 
     """Whether a lower bound is proven by a policy of the tester."""
     if not game.n_cells:
         return True
-    rise, error = rises(game, lower)
+    rise, error = rises_of(game, lower)
     worst = rise - error
     if reading is Reading.A:
         return bool((worst[tester > 0] >= 0).all())
@@ -82,32 +83,35 @@ def upper_holds(game: Game, reading: Reading, upper: Floats, ego: Floats, kept: 
     """
     if not game.n_cells:
         return True
-    rise, error = rises(game, upper)
+    rise, error = rises_of(game, upper)
     best = rise + error
     if reading is Reading.C:
         return bool((best[(ego > 0) & kept] <= 0).all())
     return bool((_mixed(ego, -best, game.cell_start)[kept[game.cell_start[:-1]]] >= 0).all())
 
 
-def rises(game: Game, value: Floats) -> tuple[Floats, Floats]:
-    """q(c) - V(s) of every cell, and a bound on its rounding error.
+def rises_of(game: Game, value: Floats) -> tuple[Floats, Floats]:
+    """The rise q(c) - V(s) of every cell, and a bound on its rounding error.
 
-    Computed as r + sum of p (V(s') - V(s)), so that errors are as small as these differences. A sum
-    of k products misses by at most k half-units of the last place of its terms (half of epsilon
-    each), every term by three (p, the difference, the product), probabilities that do not quite
-    sum to 1 by k more.
+    A sum of k products misses by at most k half-units of the last place of its terms (half of
+    epsilon each), every term by three (p, the difference, the product), probabilities that do not
+    quite sum to 1 by k more.
     """
     finite = np.where(np.isfinite(value), value, 0.0)
-    widest = np.diff(game.outcome_start)
-    here = np.repeat(finite[game.cell_state], widest)
-    terms = game.probability * (finite[game.successor] - here)
-    rise = np.add.reduceat(terms, game.outcome_start[:-1]) + game.reward
-    size = np.add.reduceat(np.abs(terms), game.outcome_start[:-1]) + np.abs(game.reward)
-    return rise, EPSILON * ((widest + 4) * size + 2.0 * magnitude(game))
+    parts = (game.outcome_start, game.successor, game.probability, game.reward, game.cell_state)
+    rise, size = rises(*parts, finite, game.fast)
+    size *= np.diff(game.outcome_start) + 4
+    size += 2.0 * magnitude(game)
+    return rise, EPSILON * size
 
 
 def _mixed(weights: Floats, gain: Floats, start: Ints) -> Floats:
     """Sums of weights times gains over the parts, lowered by what rounding may have added."""
+    used = np.flatnonzero(weights)
+    if len(used) == len(start) - 1 and (weights[used] == 1.0).all():
+        in_turn = (start[:-1] <= used) & (used < start[1:])
+        if in_turn.all():  # one in each part
+            return gain[used]
     product = np.where(weights > 0, weights * gain, 0.0)
     total = np.add.reduceat(product, start[:-1])
     room = (np.diff(start) + 4) * EPSILON * np.add.reduceat(np.abs(product), start[:-1])
@@ -140,7 +144,7 @@ def _policies(game: Game, certificate: Certificate, kept: Bools) -> bool:
         good &= _one(np.add.reduceat(tester[order], start[:-1])[inside[state]])
     if reading is Reading.A:
         rows = kept[game.cell_start[:-1]]
-        good &= bool(np.isin(tester, (0.0, 1.0)).all())
+        good &= bool(((tester == 0.0) | (tester == 1.0)).all())
         good &= _one(np.add.reduceat(ego, game.cell_start[:-1])[rows])
     return bool(good)
 

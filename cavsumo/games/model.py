@@ -24,6 +24,7 @@ import numpy as np
 import numpy.typing as npt
 
 from cavsumo.errors import InputError
+from cavsumo.games.compiled import worth_it
 
 Ints = npt.NDArray[np.int64]
 Floats = npt.NDArray[np.float64]
@@ -97,6 +98,11 @@ class Game:
         """Number of triples (state, tester action, ego action)."""
         return len(self.ego_action)
 
+    @property
+    def fast(self) -> bool:
+        """Whether the game is large enough for compiled loops, and numba is there."""
+        return worth_it(len(self.successor))
+
     @cached_property
     def row_state(self) -> Ints:
         """The state of each row."""
@@ -119,6 +125,16 @@ class Game:
 
         parts = (self.probability, self.successor, self.outcome_start)
         return csr_matrix(parts, shape=(self.n_cells, self.n_states))
+
+    @cached_property
+    def entering(self) -> tuple[Ints, Ints]:
+        """The cells with an outcome into each state: (where those of each state begin, cells)."""
+        from scipy.sparse import csr_matrix
+
+        there = np.ones(len(self.successor), dtype=bool)
+        parts = (there, self.successor, self.outcome_start)
+        found = csr_matrix(parts, shape=(self.n_cells, self.n_states)).tocsc()
+        return found.indptr, found.indices
 
     @cached_property
     def replies(self) -> tuple[Ints, Ints, Ints]:

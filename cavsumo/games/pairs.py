@@ -8,11 +8,14 @@ A pair that never reaches a goal from somewhere has a singular system: then noth
 from __future__ import annotations
 
 import warnings
+from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
 
 from cavsumo.games.model import Floats
+from cavsumo.games.rises import rises
 
 DIRECT = 1500  # states up to which systems are factorised
 FALLBACK = 5000  # states up to which they are where the iteration fails
@@ -20,7 +23,13 @@ ROUNDS, ITERATIONS = 4, 80
 
 
 def pair_value(
-    transitions: Any, reward: Floats, start: Floats, residual: float, precise: bool = True
+    transitions: Any,
+    reward: Floats,
+    start: Floats,
+    residual: float,
+    *,
+    precise: bool = True,
+    fast: bool = False,
 ) -> Floats | None:
     """V with |r + P V - V| <= residual in every state, or the best that can be had.
 
@@ -30,64 +39,105 @@ def pair_value(
         start: a guess.
         residual: wanted, absolute.
         precise: otherwise a hundredth of the guess's residual will do.
+        fast: by compiled loops.
 
     Returns:
         None when the system seems singular.
     """
-    from scipy.sparse import identity
-
-    system = (identity(len(reward), format="csr") - transitions).tocsr()
+    pair = _Pair(transitions, reward, fast)
     with warnings.catch_warnings(), np.errstate(all="ignore"):
         warnings.simplefilter("ignore")  # singular systems are answered below
         try:
             if len(reward) > DIRECT:
-                found = _refined(system, reward, start, residual, precise, _krylov(system))
+                found = _refined(pair, start, residual, precise, _krylov(pair))
                 if found is not None or len(reward) > FALLBACK:
                     return found
-            return _refined(system, reward, start, residual, precise, _factorised(system))
-        except RuntimeError:  # SuperLU: exactly singular
+            return _refined(pair, start, residual, precise, _factorised(pair))
+        except RuntimeError:  # exactly singular
             return None
 
 
+@dataclass(frozen=True)
+class _Pair:
+    """P and r, to be solved by compiled loops or not."""
+
+    transitions: Any
+    reward: Floats
+    fast: bool
+
+    def rise(self, value: Floats) -> Floats:
+        """r + P V - V."""
+        p = self.transitions
+        states = np.arange(len(value))
+        return rises(p.indptr, p.indices, p.data, self.reward, states, value, self.fast)[0]
+
+    @cached_property
+    def system(self) -> Any:
+        """I - P."""
+        from scipy.sparse import identity
+
+        return (identity(len(self.reward), format="csr") - self.transitions).tocsr()
+
+
 def _refined(
-    system: Any, reward: Floats, start: Floats, residual: float, precise: bool, solve: Any
+    pair: _Pair, start: Floats, residual: float, precise: bool, solve: Any
 ) -> Floats | None:
     """Corrections until the residual is small or does not shrink any more."""
-    value, left = start, reward - system @ start
+    value, left = start, pair.rise(start)
     size = float(np.abs(left).max(initial=0.0))
     first, wanted = size, residual if precise else max(residual, 1e-2 * size)
     for attempt in range(ROUNDS):
-        if size <= wanted:
+        if size <= max(wanted, coarseness(value)):
             break
         corrected = value + solve(left, 0.3**attempt * wanted)
-        left_now = reward - system @ corrected
+        left_now = pair.rise(corrected)
         size_now = float(np.abs(left_now).max())
         if not size_now < 0.9 * size:
             break
         value, left, size = corrected, left_now, size_now
-    noise = 16.0 * np.finfo(float).eps * float(np.abs(value).max(initial=0.0))
-    return value if size <= max(wanted, noise, 0.2 * first) else None
+    return value if size <= max(wanted, 4.0 * coarseness(value), 0.2 * first) else None
 
 
-def _factorised(system: Any) -> Any:
+def coarseness(value: Floats) -> float:
+    """How far rounding V to floats may move a rise: a unit of the last place of the largest."""
+    return float(np.spacing(np.abs(value).max(initial=0.0)))
+
+
+def _factorised(pair: _Pair) -> Any:
     from scipy.sparse.linalg import splu
 
-    factors = splu(system.tocsc())
+    factors = splu(pair.system.tocsc())
     return lambda left, _: factors.solve(left)
 
 
-def _krylov(system: Any) -> Any:
-    from scipy.sparse import tril
-    from scipy.sparse.linalg import LinearOperator, bicgstab, splu
-
-    triangle = splu(tril(system, format="csc"), permc_spec="NATURAL", diag_pivot_thresh=0.0)
-    sweep = LinearOperator(system.shape, triangle.solve)
-    norm = 0.3 * np.sqrt(system.shape[0])  # of a vector whose entries are all about 0.3
+def _krylov(pair: _Pair) -> Any:
+    """BiCGSTAB with a Gauss-Seidel sweep as preconditioner."""
+    iterate = _compiled(pair) if pair.fast else _by_scipy(pair)
+    norm = 0.3 * np.sqrt(len(pair.reward))  # of a vector whose entries are all about 0.3
 
     def solve(left: Floats, wanted: float) -> Floats:
-        enough = min(norm * wanted, 0.05 * float(np.linalg.norm(left)))
-        found: Floats
-        found, _ = bicgstab(system, left, rtol=0.0, atol=enough, maxiter=ITERATIONS, M=sweep)
+        found: Floats = iterate(left, min(norm * wanted, 0.05 * float(np.sqrt((left**2).sum()))))
         return found
 
     return solve
+
+
+def _compiled(pair: _Pair) -> Any:
+    from cavsumo.games.compiled import systems
+
+    p = pair.transitions
+    return lambda left, enough: systems.bicgstab(
+        p.indptr, p.indices, p.data, left, enough, ITERATIONS
+    )
+
+
+def _by_scipy(pair: _Pair) -> Any:
+    from scipy.sparse import tril
+    from scipy.sparse.linalg import LinearOperator, bicgstab, splu
+
+    triangle = tril(pair.system, format="csc")
+    factors = splu(triangle, permc_spec="NATURAL", diag_pivot_thresh=0.0)
+    sweep = LinearOperator(triangle.shape, factors.solve)
+    return lambda left, enough: bicgstab(
+        pair.system, left, rtol=0.0, atol=enough, maxiter=ITERATIONS, M=sweep
+    )[0]

@@ -16,10 +16,8 @@ from cavsumo.games.arena import Arena, arena
 from cavsumo.games.matrix_games import solve
 from cavsumo.games.model import Bools, Floats, Game, Ints
 from cavsumo.games.pairs import pair_value
+from cavsumo.games.parts import spans, starts
 from cavsumo.games.readings import Reading
-from cavsumo.games.regions import spans
-
-COMPILED = 200_000  # outcomes from which compiled loops are worth loading
 
 
 class Play(Protocol):
@@ -28,14 +26,14 @@ class Play(Protocol):
     arena: Arena
     sweeps: int  # before the first jump to the value of a pair
 
-    def sweep(self, value: Floats, shift: float) -> None:
+    def sweep(self, value: Floats, shift: Floats) -> None:
         """V <- T V + shift, in place, from the goals outward."""
 
     def backup(self, value: Floats) -> tuple[Floats, Any]:
-        """T V and the pair of policies that attains it."""
+        """T V - V and the pair of policies that attains T V."""
 
     def system(self, pair: Any) -> tuple[Any, Floats]:
-        """Transitions between states and rewards under a pair of policies."""
+        """Transitions between states and rewards under a pair; the last state is the goals'."""
 
     def tester(self, game: Game, pair: Any, value: Floats) -> Floats:
         """The tester's part of a pair as weights of the game's cells (``certificate``)."""
@@ -52,31 +50,21 @@ def play_of(game: Game, reading: Reading, states: Ints, kept: Bools | None) -> P
 
 
 def value_of(
-    play: Play, pair: Any, start: Floats, shift: float, residual: float, precise: bool
+    play: Play, pair: Any, start: Floats, shift: Floats, residual: float, precise: bool
 ) -> Floats | None:
-    """The value of a pair with every reward raised by ``shift``, None if it has none."""
+    """The value of a pair with rewards raised by the ``shift`` of their state, None without one."""
     transitions, reward = play.system(pair)
-    found = pair_value(transitions, reward + shift, start[:-1], residual, precise)
-    return None if found is None else np.append(found, 0.0)
+    return pair_value(
+        transitions, reward + shift, start, residual, precise=precise, fast=play.arena.fast
+    )
 
 
 def time_of(play: Play, pair: Any) -> Floats | None:
-    """The expected number of steps to a goal under a pair, None if it may be infinite."""
+    """Nearly the expected number of steps to a goal under a pair, None if it may be infinite."""
     transitions, _ = play.system(pair)
-    ones = np.ones(play.arena.size)
-    found = pair_value(transitions, ones, ones, 1e-3)
-    return None if found is None or (found < 0.9).any() else np.append(found, 0.0)
-
-
-def _bellman(arena: Arena) -> Any:
-    """The module with the operator: compiled where numba is installed and it is worth it."""
-    if len(arena.successor) >= COMPILED:
-        try:
-            from cavsumo.games import kernel
-        except ImportError:
-            return backups
-        return kernel
-    return backups
+    ones = np.append(np.ones(play.arena.size), 0.0)
+    found = pair_value(transitions, ones, ones, 1e-2, fast=play.arena.fast)
+    return None if found is None or (found[:-1] < 0.9).any() else found
 
 
 class TurnBased:
@@ -86,9 +74,14 @@ class TurnBased:
 
     def __init__(self, arena: Arena) -> None:
         self.arena = arena
-        self._bellman = _bellman(arena)
+        self._last: tuple[Ints, Any] | None = None  # pairs come again, shifted: their transitions
+        self._bellman: Any = backups
+        if arena.fast:
+            from cavsumo.games.compiled import bellman
 
-    def sweep(self, value: Floats, shift: float) -> None:
+            self._bellman = bellman
+
+    def sweep(self, value: Floats, shift: Floats) -> None:
         """See ``Play``."""
         self._bellman.sweep(self.arena, value, shift)
 
@@ -99,8 +92,9 @@ class TurnBased:
 
     def system(self, pair: Ints) -> tuple[Any, Floats]:
         """See ``Play``."""
-        chosen = self.arena.matrix[pair]
-        return chosen[:, : self.arena.size], self.arena.reward[pair]
+        if self._last is None or not np.array_equal(self._last[0], pair):
+            self._last = pair, self.arena.transitions(pair)
+        return self._last[1], np.append(self.arena.reward[pair], 0.0)
 
     def tester(self, game: Game, pair: Ints, value: Floats) -> Floats:
         """See ``Play``."""
@@ -139,7 +133,7 @@ class Simultaneous:
         self._order = np.lexsort((game.ego_action, game.cell_row))
         a = self.arena
         many = np.diff(a.state_group)
-        self._columns = np.concatenate(([0], np.cumsum(np.diff(a.group_cell)[a.state_group[:-1]])))
+        self._columns = starts(np.diff(a.group_cell)[a.state_group[:-1]])
         wide = np.diff(self._columns)
         self._column = np.arange(len(a.cells)) - np.repeat(a.group_cell[:-1], np.diff(a.group_cell))
         self._column += self._columns[a.group_state[a.cell_group]]
@@ -148,14 +142,14 @@ class Simultaneous:
             (m, w, np.flatnonzero((many == m) & (wide == w))) for m, w in shapes.tolist()
         ]
 
-    def sweep(self, value: Floats, shift: float) -> None:
+    def sweep(self, value: Floats, shift: Floats) -> None:
         """See ``Play``."""
-        value[:-1] = self.backup(value)[0][:-1] + shift
+        value += self.backup(value)[0] + shift
 
     def backup(self, value: Floats) -> tuple[Floats, tuple[Floats, Floats]]:
         """See ``Play``."""
         a = self.arena
-        q = a.matrix @ value + a.reward
+        q = a.rises(value)
         best = np.zeros(a.size + 1)
         rows, columns = np.zeros(len(a.group_cell) - 1), np.zeros(int(self._columns[-1]))
         for many, wide, states in self._alike:
@@ -174,8 +168,8 @@ class Simultaneous:
         weight = rows[a.cell_group] * columns[self._column]
         used = np.flatnonzero(weight)
         state = a.group_state[a.cell_group[used]]
-        mix = csr_matrix((weight[used], (state, used)), shape=(a.size, len(a.cells)))
-        return (mix @ a.matrix)[:, : a.size].tocsr(), mix @ a.reward
+        mix = csr_matrix((weight[used], (state, used)), shape=(a.size + 1, len(a.cells)))
+        return (mix @ a.matrix).tocsr(), mix @ a.reward
 
     def tester(self, game: Game, pair: tuple[Floats, Floats], value: Floats) -> Floats:
         """See ``Play``."""
@@ -206,7 +200,7 @@ def _sorted(game: Game) -> Game:
     sizes = np.diff(game.outcome_start)[order]
     return dataclasses.replace(
         game,
-        outcome_start=np.concatenate(([0], np.cumsum(sizes))),
+        outcome_start=starts(sizes),
         successor=game.successor[outcome],
         probability=game.probability[outcome],
         reward=game.reward[order],

@@ -10,7 +10,9 @@ that some outcome leads on and none leaves the region, the greatest X with
     C:  the same with  A a2 E a1:  supp inside X  and  supp meets Y
 
 (de Alfaro, Henzinger and Kupferman, Concurrent reachability games, 2007; B with mixed strategies).
-Each attractor takes time linear in the size of the game.
+Each attractor takes time linear in the size of the game: every outcome counts down what its cell
+lacks, every cell what its group lacks, every group what its state lacks. Groups are the rows of a
+state where the tester moves first, the ego's actions where the ego does.
 """
 
 from __future__ import annotations
@@ -21,7 +23,10 @@ from typing import Any
 import numpy as np
 
 from cavsumo.games.model import Bools, Game, Ints
+from cavsumo.games.parts import firsts, spans
 from cavsumo.games.readings import Reading
+
+NEVER = np.iinfo(np.int32).max  # lacking so much, nothing is ever complete
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,7 +54,7 @@ def sure_region(game: Game, reading: Reading = Reading.A) -> Region:
     Mixing is of no help here, so B is A.
     """
     every = np.ones(game.n_cells, dtype=bool)
-    layer, moves = _attract(game, reading is Reading.C, every, sure=True)
+    layer, moves = _attract(game, reading is Reading.C, every, np.diff(game.outcome_start))
     return Region(layer >= 0, layer, moves, layer < 0)
 
 
@@ -59,7 +64,7 @@ def almost_sure_region(game: Game, reading: Reading = Reading.A) -> Region:
     first: Bools | None = None
     while True:
         allowed = keeping(game, reading, inside)
-        layer, moves = _attract(game, reading is not Reading.A, allowed, sure=False)
+        layer, moves = _attract(game, reading is not Reading.A, allowed, 1)
         joined = layer >= 0
         first = ~joined if first is None else first
         if (joined == inside).all():
@@ -69,6 +74,8 @@ def almost_sure_region(game: Game, reading: Reading = Reading.A) -> Region:
 
 def keeping(game: Game, reading: Reading, inside: Bools) -> Bools:
     """The cells that the tester may use to stay inside, whatever the ego does."""
+    if inside.all():
+        return np.ones(game.n_cells, dtype=bool)
     kept: Bools = inside[game.cell_state] & (game.matrix @ (~inside).astype(float) == 0)
     if reading is Reading.C or not game.n_rows:
         return kept
@@ -76,80 +83,83 @@ def keeping(game: Game, reading: Reading, inside: Bools) -> Bools:
     return whole
 
 
-def spans(start: Ints, which: Ints) -> Ints:
-    """The concatenated ranges start[w] : start[w + 1] for each w in ``which``."""
-    begin, length = start[which], start[which + 1] - start[which]
-    ends = np.cumsum(length)
-    total = int(ends[-1]) if len(ends) else 0
-    found: Ints = np.arange(total) + np.repeat(begin - ends + length, length)
-    return found
+@dataclass(frozen=True)
+class _Level:
+    """Cells, groups or states of an attractor.
+
+    Attributes:
+        step: in which each was complete, -1: not yet.
+        lacking: how many parts each lacks.
+        whole: which group each cell, which state each group belongs to.
+    """
+
+    step: Ints
+    lacking: Ints
+    whole: Ints
 
 
-def _attract(game: Game, ego_first: bool, allowed: Bools, sure: bool) -> tuple[Ints, Bools]:
-    """Layers and moves of an attractor to the goals, layer by layer, each entry looked at once."""
-    entering = game.matrix.tocsc()
-    door = _ReplyDoor(game) if ego_first else _RowDoor(game)
-    lacking = np.diff(game.outcome_start) if sure else np.ones(game.n_cells, dtype=np.int64)
-    layer = np.where(game.goal, 0, -1)
+def _attract(game: Game, ego_first: bool, allowed: Bools, lacking: Any) -> tuple[Ints, Bools]:
+    """Layers and moves of an attractor to the goals by the cells that are allowed.
+
+    Args:
+        lacking: how many outcomes of a cell must lead on; a number, or one for each cell.
+    """
+    if ego_first:
+        order, start, groups = game.replies
+        group = np.empty(game.n_cells, dtype=np.int64)
+        group[order] = np.repeat(np.arange(len(start) - 1), np.diff(start))
+        state = np.repeat(np.arange(game.n_states), np.diff(groups))
+    else:
+        start, groups, group, state = (
+            game.cell_start,
+            game.row_start,
+            game.cell_row,
+            game.row_state,
+        )
+    cells = _level(np.where(allowed, lacking, NEVER), group)
+    # All cells of some row, or some cell for each action of the ego:
+    rows = _level(np.ones_like(state) if ego_first else np.diff(start), state)
+    states = _level(np.diff(groups) if ego_first else np.ones_like(groups[1:]), state)
+    states.step[game.goal] = 0
+    _spread(game, cells, rows, states)
+    layer = states.step
     moves = np.zeros(game.n_cells, dtype=bool)
+    if ego_first:
+        answers = (cells.step == rows.step[group]) & (layer[game.cell_state] > 0)
+        moves[firsts(order[answers[order]], group)] = True
+    else:
+        chosen = np.zeros(len(state), dtype=bool)
+        chosen[firsts(np.flatnonzero((rows.step == layer[state]) & (rows.step > 0)), state)] = True
+        moves = chosen[group]
+    return layer.astype(np.int64), moves
+
+
+def _level(lacking: Ints, whole: Ints) -> _Level:
+    return _Level(np.full(len(lacking), -1, np.int32), lacking.astype(np.int32), whole)
+
+
+def _spread(game: Game, cells: _Level, groups: _Level, states: _Level) -> None:
+    """Set the steps of everything from which goals are reached."""
+    start, entering = game.entering
+    if game.fast:
+        from cavsumo.games.compiled import graphs
+
+        parts = [(level.step, level.lacking, level.whole) for level in (cells, groups)]
+        graphs.spread(start, entering, *parts[0], *parts[1], states.step, states.lacking)
+        return
     frontier, step = np.flatnonzero(game.goal), 0
     while len(frontier):
         step += 1
-        hit = entering.indices[spans(entering.indptr, frontier)]
-        np.subtract.at(lacking, hit, 1)
-        hit = np.unique(hit)
-        ready = hit[allowed[hit] & (lacking[hit] <= 0)]
-        ready = ready[~door.seen[ready]]
-        states, cells = door.open(ready)
-        fresh = layer[states] < 0
-        moves[cells[layer[game.cell_state[cells]] < 0]] = True
-        frontier = np.unique(states[fresh])
-        layer[frontier] = step
-    return layer, moves & (layer[game.cell_state] >= 0)
+        ready = _completed(cells, entering[spans(start, frontier)], step)
+        ready = _completed(groups, cells.whole[ready], step)
+        frontier = _completed(states, groups.whole[ready], step)
 
 
-class _RowDoor:
-    """A state joins by a row all of whose cells are ready (E a1 A a2)."""
-
-    def __init__(self, game: Game) -> None:
-        self.game = game
-        self.lacking = np.diff(game.cell_start)
-        self.seen = np.zeros(game.n_cells, dtype=bool)
-        self.joined = np.zeros(game.n_states, dtype=bool)
-
-    def open(self, cells: Ints) -> tuple[Ints, Ints]:
-        """States that may join by these cells, and the cells by which they do."""
-        self.seen[cells] = True
-        rows = self.game.cell_row[cells]
-        np.subtract.at(self.lacking, rows, 1)
-        rows = np.unique(rows)
-        rows = rows[self.lacking[rows] == 0]
-        states, first = np.unique(self.game.row_state[rows], return_index=True)
-        new = ~self.joined[states]
-        self.joined[states] = True
-        return states[new], spans(self.game.cell_start, rows[first[new]])
-
-
-class _ReplyDoor:
-    """A state joins when each action of the ego has a ready cell (A a2 E a1)."""
-
-    def __init__(self, game: Game) -> None:
-        order, start, groups = game.replies
-        self.game = game
-        self.group = np.empty(game.n_cells, dtype=np.int64)
-        self.group[order] = np.repeat(np.arange(len(start) - 1), np.diff(start))
-        self.lacking = np.diff(groups)
-        self.seen = np.zeros(game.n_cells, dtype=bool)
-        self.answered = np.zeros(len(start) - 1, dtype=bool)
-
-    def open(self, cells: Ints) -> tuple[Ints, Ints]:
-        """States that may join by these cells, and the cells that newly answer an action."""
-        self.seen[cells] = True
-        groups, first = np.unique(self.group[cells], return_index=True)
-        new = ~self.answered[groups]
-        self.answered[groups] = True
-        answering: Any = cells[first[new]]
-        states = self.game.cell_state[answering]
-        np.subtract.at(self.lacking, states, 1)
-        states = np.unique(states)
-        return states[self.lacking[states] == 0], answering
+def _completed(level: _Level, parts: Ints, step: int) -> Ints:
+    """What the parts that came, each naming what it belongs to, made complete."""
+    np.subtract.at(level.lacking, parts, 1)
+    found = np.sort(parts[level.lacking[parts] <= 0])
+    found = found[np.diff(found, prepend=-1) > 0]  # each once
+    level.step[found] = step
+    level.lacking[found] = NEVER
+    return found

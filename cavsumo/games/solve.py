@@ -1,7 +1,8 @@
 """Expectiminimax values and policies (seed, eq. 3), between certified bounds.
 
 1. Decide whether the game is solvable; refuse it with a witness when it is not.
-2. Start from a proper tester policy, the one by which the almost-sure region was found.
+2. Start from the pair of policies that a few sweeps from V = 0 come to; where that pair does not
+   reach a goal, from a proper tester policy, the one by which the almost-sure region was found.
 3. Repeat: a Gauss-Seidel sweep of the Bellman operator T, then jump to the value of the pair of
    policies that attains it (policy iteration on both players at once). Where a pair has no value
    or nothing improves, more sweeps come between jumps: value iteration converges from anywhere.
@@ -23,18 +24,20 @@ from typing import Any
 import numpy as np
 
 from cavsumo.errors import CavsumoError
-from cavsumo.games.certificate import Certificate, holds, rises
-from cavsumo.games.components import EPSILON
+from cavsumo.games.certificate import Certificate, holds, rises_of
 from cavsumo.games.flow import best_order
 from cavsumo.games.model import Bools, Floats, Game
+from cavsumo.games.pairs import coarseness
 from cavsumo.games.plays import Play, play_of, time_of, value_of
 from cavsumo.games.readings import Reading
 from cavsumo.games.regions import keeping
 from cavsumo.games.solvable import Verdict, solvability
 
 PRECISION = 1e-6
+FIRST_SWEEPS = 4  # from V = 0
 JUMPS = 400  # to the value of a pair, at most, in each of the three solutions
 SWEEPS = 512  # between two jumps, at most
+PATIENCE = 4  # jumps in a row that do not halve the residual, before there are more sweeps
 ATTEMPTS = 12  # at a certificate
 NEAR = 100.0  # times the residual wanted, within which there are only jumps
 Tell = Callable[[str, float], None]  # called with what is being done and the residual
@@ -139,32 +142,45 @@ def _trivial(game: Game, reading: Reading, inside: Bools) -> Certificate:
 
 
 def _start(game: Game, verdict: Verdict, play: Play, tell: Tell) -> Floats:
-    """Nearly the value of the tester policy by which the region was found, against its worst ego.
+    """The value of the pair of policies that a few sweeps come to, where that reaches a goal.
 
-    In reading B: of the policy that mixes all moves by which states joined, against an ego that
-    mixes all of its own.
+    Else nearly the value of the tester policy by which the region was found, against its worst ego.
+    In reading B: 0.
     """
-    scale = float(np.abs(play.arena.reward).max(initial=0.0)) or 1.0
     value = np.zeros(play.arena.size + 1)
     if verdict.reading is Reading.B:
         return value
+    none, scale = np.zeros_like(value), _scale(play)
+    for _ in range(FIRST_SWEEPS):
+        play.sweep(value, none)
+    _, pair = play.backup(value)
+    jump = value_of(play, pair, value, none, 0.1 * scale, precise=False)
+    if jump is not None:
+        return jump
     first = play_of(game, verdict.reading, play.arena.states, verdict.proper.moves)
-    value, *_ = _approach(first, value, 0.0, 0.1 * scale, "a first policy", tell, jumps=8)
+    value, *_ = _approach(first, none, none, 0.1 * scale, "a first policy", tell, jumps=8)
     return value
+
+
+def _scale(play: Play) -> float:
+    """The size of rewards."""
+    return float(np.abs(play.arena.reward).max(initial=0.0)) or 1.0
 
 
 def _certified(
     game: Game, verdict: Verdict, play: Play, value: Floats, precision: float, tell: Tell
 ) -> Certificate:
     """Bounds that hold, as close as was asked for if floats allow it."""
-    scale = float(np.abs(play.arena.reward).max(initial=0.0)) or 1.0
-    value, pair, _ = _approach(play, value, 0.0, 1e-4 * scale, "the value", tell)
+    none = np.zeros_like(value)
+    value, pair, left = _approach(play, value, none, 1e-4 * _scale(play), "the value", tell)
     time = time_of(play, pair)
     steps = np.append(np.ones(play.arena.size), 0.0) if time is None else time
+    noise = _noise(game, verdict.reading, play, value, left)
     best, e = None, precision / (3.0 * float(steps.max()))
     for _ in range(ATTEMPTS):
-        e = max(e, _coarseness(game, play, value))
-        found = _bounds(game, verdict, play, value, steps, e, tell)
+        e = max(e, 1.25 * coarseness(value))
+        found = _bounds(game, verdict, play, value, pair, steps, e, noise, tell)
+        tell("checking the bounds", np.inf)
         width = _width(found) if holds(game, found) else np.inf
         if width <= precision:
             return found
@@ -184,12 +200,23 @@ def _width(found: Certificate) -> float:
     return float((found.upper[inside] - found.lower[inside]).max(initial=0.0))
 
 
-def _coarseness(game: Game, play: Play, value: Floats) -> float:
-    """The least e for which bounds can be found and proven: some units of the last place."""
+def _noise(game: Game, reading: Reading, play: Play, value: Floats, left: float) -> Floats:
+    """For each state how far rounding may take a rise that ought to be 0, with room to spare.
+
+    Most cells that matter lead to states of nearly the same value; only those that do not, such as
+    an accident that throws far back, need more room than a unit of the last place.
+    """
     whole = np.zeros(game.n_states)
     whole[play.arena.states] = value[:-1]
-    _, error = rises(game, whole)
-    return 4.0 * float(error.max(initial=0.0)) + 24.0 * EPSILON * float(np.abs(value).max())
+    rise, error = rises_of(game, whole)
+    error *= 4.0
+    near = np.flatnonzero(np.abs(rise) <= 2.0 * (error + left))
+    if reading is Reading.B:  # rises cancel in a mixture
+        near = np.arange(game.n_cells)
+        error += 24.0 * coarseness(value)
+    most = np.zeros(game.n_states)
+    np.maximum.at(most, game.cell_state[near], error[near])
+    return np.append(most[play.arena.states], 0.0)
 
 
 def _bounds(
@@ -197,13 +224,21 @@ def _bounds(
     verdict: Verdict,
     play: Play,
     value: Floats,
+    pair: Any,
     steps: Floats,
     e: float,
+    noise: Floats,
     tell: Tell,
 ) -> Certificate:
-    """The solutions of the game with rewards lowered and raised by e."""
-    low, low_pair, _ = _approach(play, value - e * steps, -e, 0.5 * e, "lower bound", tell)
-    high, high_pair, _ = _approach(play, low + 2.0 * e * steps, e, 0.5 * e, "upper bound", tell)
+    """The solutions of the game with rewards lowered and raised by e and some noise."""
+    shift = np.append(np.maximum(e, noise[:-1]), 0.0)
+    residual = max(0.5 * e, min(0.8 * e, coarseness(value)))
+    low, low_pair, _ = _approach(
+        play, value - e * steps, -shift, residual, "lower bound", tell, near=pair
+    )
+    high, high_pair, _ = _approach(
+        play, low + 2.0 * e * steps, shift, residual, "upper bound", tell, near=low_pair
+    )
     lower, upper = (np.where(verdict.proper.inside, 0.0, -np.inf) for _ in range(2))
     lower[play.arena.states], upper[play.arena.states] = low[:-1], high[:-1]
     return Certificate(
@@ -218,34 +253,38 @@ def _bounds(
 def _approach(
     play: Play,
     value: Floats,
-    shift: float,
+    shift: Floats,
     residual: float,
     doing: str,
     tell: Tell,
+    *,
+    near: Any = None,
     jumps: int = JUMPS,
 ) -> tuple[Floats, Any, float]:
     """V with |T V + shift - V| <= residual if it can be had, the pair that attains T V, the rest.
 
-    Returns the best V that was met.
+    ``near`` is the pair that V is nearly the value of, if one is known: then there are no sweeps
+    unless jumps do not help, as a sweep adds up rounding errors on its way. Returns the best V that
+    was met.
     """
-    sweeps, before, stuck = play.sweeps, None, 0
+    sweeps, before, stuck = play.sweeps if near is None else 0, near, 0
     best: tuple[Floats, Any, float] = (value, None, np.inf)
     for _ in range(jumps):
-        backed_up, pair = play.backup(value)
-        backed_up[:-1] += shift
-        left = float(np.abs(backed_up - value).max())
+        rise, pair = play.backup(value)
+        rise += shift
+        left = float(np.abs(rise).max())
         tell(doing, left)
         stuck = 0 if left < 0.5 * best[2] else stuck + 1
         if left < best[2] or best[1] is None:
             best = (value.copy(), pair, left)
         if left <= residual or (stuck > 6 and left <= 3.0 * residual):
             break
-        jump = value_of(play, pair, backed_up, shift, 0.25 * residual, _same(pair, before))
+        jump = value_of(play, pair, value, shift, 0.25 * residual, _same(pair, before))
         before = pair
-        if jump is None or stuck > 15:
+        if jump is None or stuck > PATIENCE:
             sweeps, stuck = min(SWEEPS, max(1, 2 * sweeps)), 0
-        value = backed_up if jump is None else jump
-        if jump is None or left > NEAR * residual:  # a sweep adds up rounding errors on its way
+        value = value + rise if jump is None else jump
+        if jump is None or left > NEAR * residual:
             for _ in range(sweeps):
                 play.sweep(value, shift)
     return best

@@ -1,7 +1,7 @@
-"""The Bellman operator as compiled loops; needs the package numba (extra ``fast``).
+"""The Bellman operator of readings A and C, as in ``backups``.
 
-The same operator as ``backups``, several times faster: no intermediate arrays, and Gauss-Seidel
-state by state instead of block by block. Compiled on first use and cached by numba.
+Gauss-Seidel goes state by state here instead of block by block. In each loop ``sign`` is 1 where
+groups are maximised and their cells minimised, -1 the other way round.
 """
 
 from __future__ import annotations
@@ -16,14 +16,13 @@ from cavsumo.games.model import Floats, Ints
 from cavsumo.games.readings import Reading
 
 
-def sweep(arena: Arena, value: Floats, shift: float) -> None:
+def sweep(arena: Arena, value: Floats, shift: Floats) -> None:
     """One Gauss-Seidel sweep of V <- T V + shift in place."""
     _sweep(*_parts(arena), value, shift)
 
 
 @njit(cache=True, nogil=True)
 def _sweep(sign, states, groups, cells, successor, probability, reward, value, shift):  # type: ignore[no-untyped-def]
-    """``sign`` is 1 where groups are maximised and their cells minimised, -1 the other way."""
     for s in range(len(states) - 1):
         best = -math.inf
         for g in range(states[s], states[s + 1]):
@@ -36,7 +35,7 @@ def _sweep(sign, states, groups, cells, successor, probability, reward, value, s
                 if least <= best:
                     break
             best = max(best, least)
-        value[s] = sign * best + shift
+        value[s] = sign * best + shift[s]
 
 
 def _parts(arena: Arena) -> tuple[object, ...]:
@@ -53,26 +52,26 @@ def _parts(arena: Arena) -> tuple[object, ...]:
 
 
 def backup(arena: Arena, value: Floats) -> tuple[Floats, Ints]:
-    """T V, with its 0 for the goals, and for each state the cell that attains it."""
-    best = np.zeros(arena.size + 1)
+    """T V - V, with its 0 for the goals, and for each state the cell that attains T V."""
+    rise = np.zeros(arena.size + 1)
     chosen = np.zeros(arena.size, dtype=np.int64)
-    _backup(*_parts(arena), value, best, chosen)
-    return best, chosen
+    _backup(*_parts(arena), value, rise, chosen)
+    return rise, chosen
 
 
 @njit(cache=True, nogil=True)
 def _backup(sign, states, groups, cells, successor, probability, reward, value, out, chosen):  # type: ignore[no-untyped-def]
-    """As ``_sweep``, into ``out``, noting the cells."""
     for s in range(len(states) - 1):
         best, taken = -math.inf, 0
         for g in range(states[s], states[s + 1]):
             least, answer = math.inf, 0
             for c in range(groups[g], groups[g + 1]):
-                q = reward[c]
+                rise = 0.0
                 for k in range(cells[c], cells[c + 1]):
-                    q += probability[k] * value[successor[k]]
-                if sign * q < least:
-                    least, answer = sign * q, c
+                    rise += probability[k] * (value[successor[k]] - value[s])
+                rise = sign * (rise + reward[c])
+                if rise < least:
+                    least, answer = rise, c
                 if least <= best:
                     break
             if least > best:

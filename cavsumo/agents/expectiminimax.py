@@ -1,0 +1,186 @@
+"""The game-playing tester: a solved game says when and whether to step into the road.
+
+It says of every episode beforehand whether its test can be forced, and against which egos.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from typing import ClassVar
+
+import numpy as np
+
+from cavsumo.abstraction.classes import EGO_CLASSES
+from cavsumo.abstraction.coordinates import Coordinates
+from cavsumo.abstraction.outlook import Constant, Free, Outlook, Unaware
+from cavsumo.abstraction.rules import Rules, against_any, against_constant
+from cavsumo.abstraction.solved import solved
+from cavsumo.agents.base import AGENTS, NOT_FORCEABLE, SURE, UNDECIDED, Agent, Forecast
+from cavsumo.agents.rehearsal import succeeds
+from cavsumo.agents.tactics import Tactic
+from cavsumo.agents.triggers import MAX_DECEL, REACTION_TIME
+from cavsumo.bodies import PEDESTRIAN, Action, Kind
+from cavsumo.checks import choice, number
+from cavsumo.scene import Scene
+from cavsumo.snapshot import Snapshot
+
+NEAR_M, FAR_M = 3.0, 6.0  # how far from the strip the tables begin: of free and of constant egos
+# Ways that are tried at once where the straight one takes too long, off the way across [rad].
+ESCAPES = tuple(math.radians(sign * turn) for turn in range(5, 75, 5) for sign in (1, -1))
+TURNING_S = 0.5  # no more is gained by turning less at first
+
+
+@AGENTS.register("expectiminimax")
+class ExpectiminimaxAgent(Agent):
+    """Plays the optimal policy of a stochastic shortest path game; says what it guarantees."""
+
+    sees_background = False
+    drives = False
+
+    PARAMETERS: ClassVar[Mapping[str, str]] = {
+        "against": "class of egos: " + "; ".join(f"{n}: {t}" for n, t in EGO_CLASSES.items()),
+        "price_per_s": "price of standing in the ego's way before its reaction zone arrives, where "
+        "a missed test costs 1 [1/s]",
+        "grid_s": "step of the lattice in time against a constant ego, at most [s]",
+        "top": "the speed that an ego of the other classes never exceeds [m/s]",
+        "accel": "its largest acceleration [m/s2], rounded up to 9 / n",
+    }
+
+    def __init__(
+        self,
+        against: str = "constant",
+        price_per_s: float = 0.01,
+        grid_s: float = 0.05,
+        top: float = 13.89,
+        accel: float = 4.5,
+    ) -> None:
+        self.against = choice("against", against, tuple(EGO_CLASSES))
+        self.promise = f"egos of class {self.against}"
+        self.price = number("price_per_s", price_per_s, 1e-6, 1.0)
+        self.grid = number("grid_s", grid_s, 0.01, 0.25)
+        self.top = number("top", top, 0.5, 60.0)
+        self.accel = number("accel", accel, 1.0, MAX_DECEL)
+
+    def check_bodies(self, kind: Kind, bodies: int) -> None:
+        if kind != PEDESTRIAN:
+            raise ValueError(f"its game is that of a {PEDESTRIAN.name}, got {kind.name}")
+
+    def prepare(self) -> None:
+        for rules in self._rules():
+            solved(rules)
+
+    def reset(self, scene: Scene, owned: Sequence[int], rng: np.random.Generator) -> None:
+        super().reset(scene, owned, rng)
+        self._outlooks = {i: self._outlooks_of(i) for i in owned}
+        self.tactics = [Tactic(scene, i, self._outlooks[i]) for i in owned]
+        self.team = self.tactics
+        self.leader: Tactic | None = None
+
+    def forecast(self, snapshot: Snapshot) -> Forecast:
+        where = {i: Coordinates(self.scene, i)(snapshot) for i in self.owned}
+        outlooks = {i: self._outlooks[i][0] for i in self.owned}
+        worth = [outlooks[i].worth(here) for i, here in where.items() if here is not None]
+        best = max(worth, default=-1.0)
+        if self.against == "constant":
+            return Forecast(self._rehearsed(snapshot), best)
+        if any(here is not None and outlooks[i].sure(here) for i, here in where.items()):
+            return Forecast(SURE, best)
+        if any(here is not None and outlooks[i].possible(here) for i, here in where.items()):
+            return Forecast(UNDECIDED, best)
+        return Forecast(NOT_FORCEABLE, best)
+
+    def choose_action(self, snapshot: Snapshot) -> tuple[Action, ...]:
+        chosen = [None if t.going else t.idle(snapshot) for t in self.tactics]
+        if snapshot.sees_ego:
+            self._send(snapshot, chosen)
+        return tuple(
+            t.go(snapshot) if t.going or idle is None else idle
+            for t, idle in zip(self.tactics, chosen, strict=True)
+        )
+
+    @classmethod
+    def coordinate(cls, agents: Sequence[Agent], rng: np.random.Generator) -> None:
+        mine = [agent for agent in agents if isinstance(agent, ExpectiminimaxAgent)]
+        team = [tactic for agent in mine for tactic in agent.tactics]
+        for agent in mine:
+            agent.team = team
+
+    def _send(self, snapshot: Snapshot, idle: Sequence[Action | None]) -> None:
+        """Let one body go, if it is time and no other is on its way to a test.
+
+        One that is not sure to succeed waits while another is.
+        """
+        if any(t.going and not t.lost(snapshot) for t in self.team):
+            return
+        if self.leader is not None and self.leader.lost(snapshot):
+            self.leader = None
+        gain, n = 0.0, 0
+        for i, (tactic, action) in enumerate(zip(self.tactics, idle, strict=True)):
+            if action is not None and self.leader in (None, tactic):
+                gain, n = max((gain, n), (tactic.due(snapshot, action), -i))
+        if gain >= 1.0 or (gain > 0.0 and not any(t.sure(snapshot) for t in self.team)):
+            self.tactics[-n].going = True
+
+    def _rehearsed(self, snapshot: Snapshot) -> str:
+        """The verdict of episodes played in the head; the way that succeeds is the one taken."""
+        scene = self.scene
+        for n, i in enumerate(self.owned):
+            for turn in (None, *self._escapes(snapshot, i)):
+                if succeeds(scene, snapshot, Tactic(scene, i, self._outlooks[i], turn)):
+                    self._lead(n, turn)
+                    return SURE
+        return NOT_FORCEABLE
+
+    def _escapes(self, snapshot: Snapshot, index: int) -> tuple[float, ...]:
+        """Oblique ways worth trying [rad]: none where the straight one is late by more than the
+        best of them gains.
+
+        On a way at phi to the straight one a body at speed w gains d tan(phi) of the ego's way and
+        loses d (1 / cos(phi) - 1) / w of its time: at best d / w (1 - sqrt(1 - (w / v)^2)).
+        """
+        outlook, here = self._outlooks[index][-1], Coordinates(self.scene, index)(snapshot)
+        if here is None or here.left <= 0.0 or here.gap <= 0.0:
+            return ()
+        w, v = outlook.kind.v_max, here.v
+        if v > w:
+            gain = here.left / w * (1.0 - math.sqrt(1.0 - (w / v) ** 2))
+            t, _, _ = outlook.walked(here, 0.0)
+            late = t - here.gap / v + 0.5 * v / outlook.max_decel
+            if late > gain + TURNING_S:
+                return ()
+        return ESCAPES
+
+    def _lead(self, n: int, escape: float | None) -> None:
+        """Let one body play alone as long as it can come to a test."""
+        self.leader = self.tactics[n]
+        self.leader.escape, self.leader.going = escape, escape is not None
+
+    def _rules(self) -> list[Rules]:
+        """The games it plays, that of its class first."""
+        constant = against_constant(PEDESTRIAN, REACTION_TIME, FAR_M, self.price, self.grid)
+        if self.against == "constant":
+            return [constant]
+        free = against_any(
+            PEDESTRIAN,
+            max_decel=MAX_DECEL,
+            reaction_time=REACTION_TIME,
+            top=self.top,
+            accel=self.accel,
+            left_max=NEAR_M,
+            price=self.price,
+        )
+        return [free, constant]
+
+    def _outlooks_of(self, index: int) -> tuple[Outlook, ...]:
+        """How one body judges its chances."""
+        scene, tables = self.scene, [solved(rules) for rules in self._rules()]
+        kind = scene.bodies[index].kind
+        found: list[Outlook] = [Constant(kind, tables[-1], MAX_DECEL, scene.dt)]
+        met = Coordinates(scene, index).meeting
+        if self.against == "any":
+            found.insert(0, Free(kind, tables[0], MAX_DECEL, scene.dt))
+        elif self.against == "unaware":
+            kerb = met.strip - met.way.enter + kind.length / 2 if met else 0.0
+            found.insert(0, Unaware(kind, tables[0], MAX_DECEL, scene.dt, kerb))
+        return tuple(found)
