@@ -224,8 +224,7 @@ def _add_scenario(group: Any) -> None:
         "--formula",
         action="append",
         metavar="NAME=TEXT",
-        help="temporal logic, such as 'apart=always (gap_m > 0.5)'; asserted unless --assert names "
-        "others",
+        help="temporal logic that the ego must keep too, such as 'apart=always (gap_m > 0.5)'",
     )
     add(
         "--reference",

@@ -40,6 +40,8 @@ def settings_of(options: argparse.Namespace) -> dict[str, Any]:
     settings = {key: value for key, value in given.items() if value is not None}
     if options.formula:
         settings["formulas"] = dict(_formula(word) for word in options.formula)
+        if named := settings.get("assertions"):  # who writes a formula here means it
+            settings["assertions"] = list(dict.fromkeys([*named, *settings["formulas"]]))
     for key, words in (
         ("params", options.param),
         ("ego_params", options.ego_param),

@@ -306,6 +306,16 @@ def test_a_function_on_the_command_line(street: Path) -> None:
     assert main(["replay", "own.csv", "0"]) == 0
 
 
+def test_a_formula_on_the_command_line_is_asserted_beside_others(street: Path) -> None:
+    """Nobody writes one there to leave it out."""
+    assert run("both.csv", "--formula", "apart=always (gap_m > -9)", "--assert", "collision") in (
+        0,
+        1,
+    )
+    for row in rows(street / "both.csv"):
+        assert [said.split("=")[0] for said in row["verdicts"].split()] == ["collision", "apart"]
+
+
 def test_a_fault_is_an_error_row(street: Path, controller: Writer) -> None:
     """An assertion that raises costs its episode, exit status 3."""
     controller("def late(s):\n    return 1 / abs(s.step - 3)\n", "faulty")
