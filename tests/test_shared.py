@@ -94,6 +94,7 @@ def test_lights_begin_anew(open_world: Opener) -> None:
     assert first[0]
 
 
+@pytest.mark.slow
 def test_rows_do_not_depend_on_who_plays_them(networks: dict[str, Path], tmp_path: Path) -> None:
     """One process or two, at once or resumed in the middle of a block: the same rows."""
     words = ["-n", str(networks["crossing"]), "--reset", "shared", "--runs", str(SHARED_BY + 3)]

@@ -252,6 +252,7 @@ def untold(found: list[dict[str, str]]) -> list[dict[str, str]]:
     return [row | {"trace": row["trace"].rpartition("/")[2]} for row in found]
 
 
+@pytest.mark.slow
 def test_an_interrupted_study_goes_on_where_it_stopped(home: Path) -> None:
     """Ctrl-C in the first batch: 130, the second is not begun; then all is as if played at once."""
     words = [sys.executable, "-m", "cavsumo", "run", "-c", "study.toml", "--exit-zero", "-q"]

@@ -196,6 +196,7 @@ def test_shared_simulations_have_the_same_traffic(open_world: Opener) -> None:
         assert again[:common] == own[:common]
 
 
+@pytest.mark.slow
 def test_rows_do_not_depend_on_the_processes(
     tmp_path: Path, networks: dict[str, Path], monkeypatch: pytest.MonkeyPatch
 ) -> None:
