@@ -69,6 +69,9 @@ class World:
         self._roaming: Roaming | None = None
         self._mark = object()  # stands for this world in _PLAYING without keeping it alive
         shapely.prepare(site.crossings)
+        self._walks = [crossing.light for crossing in site.marked]
+        # Each light is asked once a timestep, however many of its links matter.
+        self._lights = {light.id for light in site.lights} | {w[0] for w in self._walks if w}
 
     def __enter__(self) -> World:
         return self
@@ -309,10 +312,9 @@ class World:
         persons = libsumo.person.getIDList()
         raw = self._background.read(self._vehicles, persons, (ego, *states))
         time = round(self._step * self.dt, 6)
-        state = libsumo.trafficlight.getRedYellowGreenState
-        lights = tuple([state(light.id)[light.link] for light in self.site.lights])
-        walks = [crossing.light for crossing in self.site.marked]
-        crossings = tuple([state(light[0])[light[1]] if light else "" for light in walks])
+        shown = {name: libsumo.trafficlight.getRedYellowGreenState(name) for name in self._lights}
+        lights = tuple([shown[light.id][light.link] for light in self.site.lights])
+        crossings = tuple([shown[walk[0]][walk[1]] if walk else "" for walk in self._walks])
         return Snapshot(
             self._step, time, ego, self._steering, states, raw, lights, crossing_lights=crossings
         )

@@ -125,7 +125,7 @@ class BestResponseAgent(Agent):
         self._every = max(1, round(MODEL_DT / scene.dt))
         dt = scene.dt * self._every
         self.plan = _planned(self.planned, dt, self.aim) if self.planned else None
-        self._watch = Watch(dt)
+        self.watch = Watch(dt)
         self.coordinates = [Coordinates(scene, i) for i in range(len(scene.bodies))]
         self._pupils = [Pupil(self, i) for i in self.owned]
         self._told: tuple[int, int, int] | None = None
@@ -138,17 +138,12 @@ class BestResponseAgent(Agent):
             for pupil, state in zip(self._pupils, self.own(snapshot), strict=True)
         )
 
-    @property
-    def watch(self) -> Watch:
-        """What is known of the ego's acceleration."""
-        return self._watch
-
     def _look(self, snapshot: Snapshot) -> None:
         """See what the ego did, and count it in the situation in which it was."""
         if not snapshot.sees_ego:
-            self._watch, self._told = Watch(self._watch.dt), None
+            self.watch, self._told = Watch(self.watch.dt), None
             return
-        watch, held = self._watch, self._watch.held
+        watch, held = self.watch, self.watch.held
         watch.see(snapshot.ego.v)
         if not self.learn:
             return
@@ -168,8 +163,9 @@ class BestResponseAgent(Agent):
             ):
                 continue
             entry = entry_time(coordinates.kind, here, self.scene.dt)
-            if entry < 1.15 and here.v / (here.gap + 0.05) >= need:
-                worst, need = (entry, here.gap), here.v / (here.gap + 0.05)
+            needed = here.v / (here.gap + 0.05)
+            if entry < 1.15 and needed >= need:
+                worst, need = (entry, here.gap), needed
         return situation(*worst, snapshot.ego.v)
 
 
