@@ -18,7 +18,7 @@ PACKAGE = Path(cavsumo.__file__).parent
 ORDER = """
     cavsumo errors checks registry imports processes
     games.compiled games.compiled.graphs games.compiled.systems
-    games.model games.build games.files games.readings games.parts games.rises games.regions
+    games.model games.build games.files games.readings games.segments games.advantages games.regions
     games.components games.solvable games.policies games.chains games.evaluation games.proper
     games.certificate games.flow games.arena games.compiled.bellman games.backups
     games.matrix_games games.pairs games.plays

@@ -25,7 +25,7 @@ from cavsumo.games.files import read_game
 from cavsumo.games.model import Game
 from cavsumo.games.policies import ego_actions
 from cavsumo.games.readings import Reading
-from cavsumo.games.solvable import Verdict
+from cavsumo.games.solvable import Solvability
 from cavsumo.games.solve import NotCertified, Solution, Tell, Unsolvable, solve
 
 FORMAT = 1  # of the JSON; raised when a key changes its meaning or goes
@@ -82,7 +82,7 @@ def solve_file(order: Order) -> int:
     return _status(order, verdict, solution)
 
 
-def _status(order: Order, verdict: Verdict, solution: Solution | None) -> int:
+def _status(order: Order, verdict: Solvability, solution: Solution | None) -> int:
     """The exit status; says on stderr when the bounds are wider than asked for."""
     if solution is not None and not solution.precise:
         print(
@@ -163,7 +163,7 @@ def _said(doing: str, left: float) -> str:
 # JSON
 
 
-def _json(order: Order, game: Game, verdict: Verdict, solution: Solution | None) -> str:
+def _json(order: Order, game: Game, verdict: Solvability, solution: Solution | None) -> str:
     """The result as JSON, with stable keys (docs/games.md)."""
     found: dict[str, Any] = {
         "format": FORMAT,
@@ -187,7 +187,7 @@ def _json(order: Order, game: Game, verdict: Verdict, solution: Solution | None)
     return json.dumps(found)
 
 
-def _witness(verdict: Verdict) -> dict[str, Any] | None:
+def _witness(verdict: Solvability) -> dict[str, Any] | None:
     """The states that stand against a solution."""
     if verdict.solvable:
         return None
@@ -230,7 +230,7 @@ def _move(game: Game, solution: Solution, state: int) -> Any:
 # Table
 
 
-def _table(order: Order, game: Game, verdict: Verdict, solution: Solution | None) -> str:
+def _table(order: Order, game: Game, verdict: Solvability, solution: Solution | None) -> str:
     """The result as a text."""
     text = io.StringIO()
     console = Console(width=110, file=text)
@@ -260,7 +260,7 @@ def _say(console: Console, text: str) -> None:
     console.print(text, markup=False, highlight=False, soft_wrap=True)
 
 
-def _solvable_in_words(game: Game, verdict: Verdict) -> str:
+def _solvable_in_words(game: Game, verdict: Solvability) -> str:
     """Solvability in one line."""
     if not verdict.solvable:
         return f"not solvable: {verdict.reason(game)}"
@@ -274,7 +274,7 @@ def _solvable_in_words(game: Game, verdict: Verdict) -> str:
     )
 
 
-def _states_table(game: Game, verdict: Verdict, solution: Solution) -> Table:
+def _states_table(game: Game, verdict: Solvability, solution: Solution) -> Table:
     """A line for each state."""
     table = Table(box=None, pad_edge=False, padding=(0, 3, 0, 0))
     for name in ("state", "lower", "upper", "a goal is", "within", "policy"):

@@ -28,7 +28,7 @@ from cavsumo.games.policies import (
 from cavsumo.games.proper import is_proper, literally_solvable, proper_states, sure_steps
 from cavsumo.games.readings import Reading
 from cavsumo.games.regions import Region, almost_sure_region, sure_region
-from cavsumo.games.solvable import Verdict, solvability
+from cavsumo.games.solvable import Solvability, solvability
 from cavsumo.games.solve import NotCertified, Solution, Unsolvable, solve
 
 __all__ = [
@@ -44,9 +44,9 @@ __all__ = [
     "Reading",
     "Region",
     "Solution",
+    "Solvability",
     "Stationary",
     "Unsolvable",
-    "Verdict",
     "almost_sure_region",
     "execute",
     "expected_value",

@@ -16,10 +16,10 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from cavsumo.games.advantages import advantages
 from cavsumo.games.model import Bools, Floats, Game, Ints
-from cavsumo.games.parts import gathered, spans, starts
 from cavsumo.games.readings import Reading
-from cavsumo.games.rises import rises
+from cavsumo.games.segments import gathered, spans, starts
 
 BLOCK = 128  # states that are swept at a time, at least
 
@@ -81,10 +81,10 @@ class Arena:
         """The state of each cell."""
         return self.group_state[self.cell_group]
 
-    def rises(self, value: Floats) -> Floats:
+    def advantages(self, value: Floats) -> Floats:
         """r + sum of p V(s') - V(s) of every cell."""
         parts = (self.cell_outcome, self.successor, self.probability, self.reward, self.cell_state)
-        return rises(*parts, value, self.fast)[0]
+        return advantages(*parts, value, self.fast)[0]
 
     @cached_property
     def matrix(self) -> Any:

@@ -10,8 +10,8 @@ import numpy as np
 
 from cavsumo.games.arena import Arena, Block
 from cavsumo.games.model import Floats, Ints
-from cavsumo.games.parts import firsts
 from cavsumo.games.readings import Reading
+from cavsumo.games.segments import firsts
 
 
 def sweep(arena: Arena, value: Floats, shift: Floats) -> None:
@@ -41,11 +41,11 @@ def _swept(arena: Arena, block: Block, value: Floats, outer: np.ufunc, inner: np
 def backup(arena: Arena, value: Floats) -> tuple[Floats, Ints]:
     """T V - V, with its 0 for the goals, and for each state the cell that attains T V."""
     outer, inner = _operators(arena)
-    rise = arena.rises(value)
-    answer = inner.reduceat(rise, arena.group_cell[:-1])
+    advantage = arena.advantages(value)
+    answer = inner.reduceat(advantage, arena.group_cell[:-1])
     best = outer.reduceat(answer, arena.state_group[:-1])
     group = firsts(np.flatnonzero(answer == best[arena.group_state]), arena.group_state)
-    cell = firsts(np.flatnonzero(rise == answer[arena.cell_group]), arena.cell_group)
+    cell = firsts(np.flatnonzero(advantage == answer[arena.cell_group]), arena.cell_group)
     return np.append(best, 0.0), cell[group]
 
 
@@ -54,6 +54,6 @@ def answers(arena: Arena, value: Floats) -> Ints:
     if len(arena.group_cell) - 1 == len(arena.cells):
         return np.arange(len(arena.cells))  # no choice
     _, inner = _operators(arena)
-    rise = arena.rises(value)
-    best = inner.reduceat(rise, arena.group_cell[:-1])
-    return firsts(np.flatnonzero(rise == best[arena.cell_group]), arena.cell_group)
+    advantage = arena.advantages(value)
+    best = inner.reduceat(advantage, arena.group_cell[:-1])
+    return firsts(np.flatnonzero(advantage == best[arena.cell_group]), arena.cell_group)

@@ -26,10 +26,10 @@ from typing import Any
 
 import numpy as np
 
+from cavsumo.games.advantages import advantages
 from cavsumo.games.components import EPSILON, magnitude
 from cavsumo.games.model import Bools, Floats, Game, GameError, Ints
 from cavsumo.games.readings import Reading
-from cavsumo.games.rises import rises
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,8 +66,8 @@ def lower_holds(game: Game, reading: Reading, lower: Floats, tester: Floats) -> 
     """Whether a lower bound is proven by a policy of the tester."""
     if not game.n_cells:
         return True
-    rise, error = rises_of(game, lower)
-    worst = rise - error
+    advantage, error = advantages_of(game, lower)
+    worst = advantage - error
     if reading is Reading.A:
         return bool((worst[tester > 0] >= 0).all())
     order, start, _ = game.replies
@@ -83,15 +83,15 @@ def upper_holds(game: Game, reading: Reading, upper: Floats, ego: Floats, kept: 
     """
     if not game.n_cells:
         return True
-    rise, error = rises_of(game, upper)
-    best = rise + error
+    advantage, error = advantages_of(game, upper)
+    best = advantage + error
     if reading is Reading.C:
         return bool((best[(ego > 0) & kept] <= 0).all())
     return bool((_mixed(ego, -best, game.cell_start)[kept[game.cell_start[:-1]]] >= 0).all())
 
 
-def rises_of(game: Game, value: Floats) -> tuple[Floats, Floats]:
-    """The rise q(c) - V(s) of every cell, and a bound on its rounding error.
+def advantages_of(game: Game, value: Floats) -> tuple[Floats, Floats]:
+    """The advantage q(c) - V(s) of every cell, and a bound on its rounding error.
 
     A sum of k products misses by at most k half-units of the last place of its terms (half of
     epsilon each), every term by three (p, the difference, the product), probabilities that do not
@@ -99,10 +99,10 @@ def rises_of(game: Game, value: Floats) -> tuple[Floats, Floats]:
     """
     finite = np.where(np.isfinite(value), value, 0.0)
     parts = (game.outcome_start, game.successor, game.probability, game.reward, game.cell_state)
-    rise, size = rises(*parts, finite, game.fast)
+    advantage, size = advantages(*parts, finite, game.fast)
     size *= np.diff(game.outcome_start) + 4
     size += 2.0 * magnitude(game)
-    return rise, EPSILON * size
+    return advantage, EPSILON * size
 
 
 def _mixed(weights: Floats, gain: Floats, start: Ints) -> Floats:

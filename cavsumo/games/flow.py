@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from cavsumo.games.model import Bools, Game, Ints
-from cavsumo.games.parts import firsts, gathered, starts
+from cavsumo.games.segments import firsts, gathered, starts
 
 SWEEPS = 2
 WORTH_IT = 2000  # states from which a choice is made

@@ -14,8 +14,8 @@ from typing import Any
 
 import numpy as np
 
+from cavsumo.games.advantages import advantages
 from cavsumo.games.model import Floats
-from cavsumo.games.rises import rises
 
 DIRECT = 1500  # states up to which systems are factorised
 FALLBACK = 5000  # states up to which they are where the iteration fails
@@ -65,11 +65,11 @@ class _Pair:
     reward: Floats
     fast: bool
 
-    def rise(self, value: Floats) -> Floats:
+    def advantage(self, value: Floats) -> Floats:
         """r + P V - V."""
         p = self.transitions
         states = np.arange(len(value))
-        return rises(p.indptr, p.indices, p.data, self.reward, states, value, self.fast)[0]
+        return advantages(p.indptr, p.indices, p.data, self.reward, states, value, self.fast)[0]
 
     @cached_property
     def system(self) -> Any:
@@ -83,14 +83,14 @@ def _refined(
     pair: _Pair, start: Floats, residual: float, precise: bool, solve: Any
 ) -> Floats | None:
     """Corrections until the residual is small or does not shrink any more."""
-    value, left = start, pair.rise(start)
+    value, left = start, pair.advantage(start)
     size = float(np.abs(left).max(initial=0.0))
     first, wanted = size, residual if precise else max(residual, 1e-2 * size)
     for attempt in range(ROUNDS):
         if size <= max(wanted, coarseness(value)):
             break
         corrected = value + solve(left, 0.3**attempt * wanted)
-        left_now = pair.rise(corrected)
+        left_now = pair.advantage(corrected)
         size_now = float(np.abs(left_now).max())
         if not size_now < 0.9 * size:
             break
@@ -99,7 +99,7 @@ def _refined(
 
 
 def coarseness(value: Floats) -> float:
-    """How far rounding V to floats may move a rise: a unit of the last place of the largest."""
+    """How far rounding V to floats may move an advantage: a unit of its last place."""
     return float(np.spacing(np.abs(value).max(initial=0.0)))
 
 

@@ -19,7 +19,7 @@ from cavsumo.errors import InputError
 from cavsumo.games.drawing import LIMIT, Node, size, tree
 from cavsumo.games.model import Game
 from cavsumo.games.readings import Reading
-from cavsumo.games.solvable import Verdict
+from cavsumo.games.solvable import Solvability
 from cavsumo.games.solve import Solution
 
 TESTER, EGO, CHANCE, GOAL = "#1b6ca8", "#c0392b", "#f2f2f2", "#2e8b57"
@@ -39,7 +39,7 @@ SIZES |= {"chance": SMALL}
 STATES_DRAWN = 40  # in the picture of a policy
 
 
-def draw_tree(game: Game, verdict: Verdict, solution: Solution | None, file: Path) -> None:
+def draw_tree(game: Game, verdict: Solvability, solution: Solution | None, file: Path) -> None:
     """Draw the game's tree, what the policies play in colour; raises InputError if it is too big.
 
     Each state is unfolded once; where it is met again a dashed circle stands for it.
@@ -121,7 +121,7 @@ def _mark(axes: Axes, node: Node, lit: bool) -> None:
         axes.text(*where, node.text, ha="center", va="center", fontsize=8, color=colour, zorder=6)
 
 
-def _title(game: Game, verdict: Verdict, solution: Solution | None) -> str:
+def _title(game: Game, verdict: Solvability, solution: Solution | None) -> str:
     """What is shown."""
     name = game.name or "game"
     if solution is None:
@@ -172,7 +172,7 @@ def _finish(figure: Figure, axes: Axes, title: str, legend: list[Line2D], file: 
         raise InputError(f"{str(file)!r}: {error.strerror}") from error
 
 
-def draw_policy(game: Game, verdict: Verdict, solution: Solution | None, file: Path) -> None:
+def draw_policy(game: Game, verdict: Solvability, solution: Solution | None, file: Path) -> None:
     """Draw what the policies make of the game: the states that are met, from left to right.
 
     States with larger values stand higher; an arrow is a step that may be made, with its

@@ -16,8 +16,8 @@ from cavsumo.games.arena import Arena, arena
 from cavsumo.games.matrix_games import solve
 from cavsumo.games.model import Bools, Floats, Game, Ints
 from cavsumo.games.pairs import pair_value
-from cavsumo.games.parts import spans, starts
 from cavsumo.games.readings import Reading
+from cavsumo.games.segments import spans, starts
 
 
 class Play(Protocol):
@@ -149,7 +149,7 @@ class Simultaneous:
     def backup(self, value: Floats) -> tuple[Floats, tuple[Floats, Floats]]:
         """See ``Play``."""
         a = self.arena
-        q = a.rises(value)
+        q = a.advantages(value)
         best = np.zeros(a.size + 1)
         rows, columns = np.zeros(len(a.group_cell) - 1), np.zeros(int(self._columns[-1]))
         for many, wide, states in self._alike:

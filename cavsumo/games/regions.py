@@ -23,8 +23,8 @@ from typing import Any
 import numpy as np
 
 from cavsumo.games.model import Bools, Game, Ints
-from cavsumo.games.parts import firsts, spans
 from cavsumo.games.readings import Reading
+from cavsumo.games.segments import firsts, spans
 
 NEVER = np.iinfo(np.int32).max  # lacking so much, nothing is ever complete
 

@@ -51,7 +51,7 @@ class Cycle:
 
 
 @dataclass(frozen=True, eq=False)
-class Verdict:
+class Solvability:
     """Whether a game is strongly solvable.
 
     Attributes:
@@ -83,13 +83,13 @@ class Verdict:
         return "; ".join(reasons)
 
 
-def solvability(game: Game, reading: Reading = Reading.A) -> Verdict:
+def solvability(game: Game, reading: Reading = Reading.A) -> Solvability:
     """Decide whether a game is strongly solvable, with a witness when it is not."""
     proper, sure = almost_sure_region(game, reading), sure_region(game, reading)
     trap = None
     if not proper.inside.all():
         trap = Trap(np.flatnonzero(proper.outside), np.flatnonzero(~proper.inside))
-    return Verdict(reading, proper, sure, trap, free_cycle(game))
+    return Solvability(reading, proper, sure, trap, free_cycle(game))
 
 
 def free_cycle(game: Game) -> Cycle | None:

@@ -24,14 +24,14 @@ from typing import Any
 import numpy as np
 
 from cavsumo.errors import CavsumoError
-from cavsumo.games.certificate import Certificate, holds, rises_of
+from cavsumo.games.certificate import Certificate, advantages_of, holds
 from cavsumo.games.flow import best_order
 from cavsumo.games.model import Bools, Floats, Game
 from cavsumo.games.pairs import coarseness
 from cavsumo.games.plays import Play, play_of, time_of, value_of
 from cavsumo.games.readings import Reading
 from cavsumo.games.regions import keeping
-from cavsumo.games.solvable import Verdict, solvability
+from cavsumo.games.solvable import Solvability, solvability
 
 PRECISION = 1e-6
 FIRST_SWEEPS = 4  # from V = 0
@@ -46,7 +46,7 @@ Tell = Callable[[str, float], None]  # called with what is being done and the re
 class Unsolvable(CavsumoError):
     """The game is not solvable; ``verdict`` has the witness."""
 
-    def __init__(self, game: Game, verdict: Verdict) -> None:
+    def __init__(self, game: Game, verdict: Solvability) -> None:
         self.verdict = verdict
         super().__init__(f"not solvable in reading {verdict.reading}: {verdict.reason(game)}")
 
@@ -66,7 +66,7 @@ class Solution:
         precision: which was asked for.
     """
 
-    verdict: Verdict
+    verdict: Solvability
     certificate: Certificate
     precision: float
 
@@ -141,7 +141,7 @@ def _trivial(game: Game, reading: Reading, inside: Bools) -> Certificate:
     return Certificate(reading, value, value, none, none)
 
 
-def _start(game: Game, verdict: Verdict, play: Play, tell: Tell) -> Floats:
+def _start(game: Game, verdict: Solvability, play: Play, tell: Tell) -> Floats:
     """The value of the pair of policies that a few sweeps come to, where that reaches a goal.
 
     Else nearly the value of the tester policy by which the region was found, against its worst ego.
@@ -168,7 +168,7 @@ def _scale(play: Play) -> float:
 
 
 def _certified(
-    game: Game, verdict: Verdict, play: Play, value: Floats, precision: float, tell: Tell
+    game: Game, verdict: Solvability, play: Play, value: Floats, precision: float, tell: Tell
 ) -> Certificate:
     """Bounds that hold, as close as was asked for if floats allow it."""
     none = np.zeros_like(value)
@@ -201,17 +201,17 @@ def _width(found: Certificate) -> float:
 
 
 def _noise(game: Game, reading: Reading, play: Play, value: Floats, left: float) -> Floats:
-    """For each state how far rounding may take a rise that ought to be 0, with room to spare.
+    """For each state how far rounding may take an advantage that ought to be 0, with room to spare.
 
     Most cells that matter lead to states of nearly the same value; only those that do not, such as
     an accident that throws far back, need more room than a unit of the last place.
     """
     whole = np.zeros(game.n_states)
     whole[play.arena.states] = value[:-1]
-    rise, error = rises_of(game, whole)
+    advantage, error = advantages_of(game, whole)
     error *= 4.0
-    near = np.flatnonzero(np.abs(rise) <= 2.0 * (error + left))
-    if reading is Reading.B:  # rises cancel in a mixture
+    near = np.flatnonzero(np.abs(advantage) <= 2.0 * (error + left))
+    if reading is Reading.B:  # advantages cancel in a mixture
         near = np.arange(game.n_cells)
         error += 24.0 * coarseness(value)
     most = np.zeros(game.n_states)
@@ -221,7 +221,7 @@ def _noise(game: Game, reading: Reading, play: Play, value: Floats, left: float)
 
 def _bounds(
     game: Game,
-    verdict: Verdict,
+    verdict: Solvability,
     play: Play,
     value: Floats,
     pair: Any,
@@ -270,9 +270,9 @@ def _approach(
     sweeps, before, stuck = play.sweeps if near is None else 0, near, 0
     best: tuple[Floats, Any, float] = (value, None, np.inf)
     for _ in range(jumps):
-        rise, pair = play.backup(value)
-        rise += shift
-        left = float(np.abs(rise).max())
+        advantage, pair = play.backup(value)
+        advantage += shift
+        left = float(np.abs(advantage).max())
         tell(doing, left)
         stuck = 0 if left < 0.5 * best[2] else stuck + 1
         if left < best[2] or best[1] is None:
@@ -283,7 +283,7 @@ def _approach(
         before = pair
         if jump is None or stuck > PATIENCE:
             sweeps, stuck = min(SWEEPS, max(1, 2 * sweeps)), 0
-        value = value + rise if jump is None else jump
+        value = value + advantage if jump is None else jump
         if jump is None or left > NEAR * residual:
             for _ in range(sweeps):
                 play.sweep(value, shift)

@@ -53,10 +53,10 @@ def _parts(arena: Arena) -> tuple[object, ...]:
 
 def backup(arena: Arena, value: Floats) -> tuple[Floats, Ints]:
     """T V - V, with its 0 for the goals, and for each state the cell that attains T V."""
-    rise = np.zeros(arena.size + 1)
+    advantage = np.zeros(arena.size + 1)
     chosen = np.zeros(arena.size, dtype=np.int64)
-    _backup(*_parts(arena), value, rise, chosen)
-    return rise, chosen
+    _backup(*_parts(arena), value, advantage, chosen)
+    return advantage, chosen
 
 
 @njit(cache=True, nogil=True)
@@ -66,12 +66,12 @@ def _backup(sign, states, groups, cells, successor, probability, reward, value, 
         for g in range(states[s], states[s + 1]):
             least, answer = math.inf, 0
             for c in range(groups[g], groups[g + 1]):
-                rise = 0.0
+                advantage = 0.0
                 for k in range(cells[c], cells[c + 1]):
-                    rise += probability[k] * (value[successor[k]] - value[s])
-                rise = sign * (rise + reward[c])
-                if rise < least:
-                    least, answer = rise, c
+                    advantage += probability[k] * (value[successor[k]] - value[s])
+                advantage = sign * (advantage + reward[c])
+                if advantage < least:
+                    least, answer = advantage, c
                 if least <= best:
                     break
             if least > best:

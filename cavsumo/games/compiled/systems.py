@@ -1,4 +1,4 @@
-"""Sums over outcomes, as in ``rises``, and linear systems x = b + P x with P in CSR form.
+"""Sums over outcomes, as in ``advantages``, and linear systems x = b + P x with P in CSR form.
 
 Gauss-Seidel sweeps, as in ``flow`` and ``pairs``.
 """
@@ -12,18 +12,18 @@ from numba import njit
 
 
 @njit(cache=True, nogil=True)
-def rises(start, successor, probability, reward, own, value):  # type: ignore[no-untyped-def]
+def advantages(start, successor, probability, reward, own, value):  # type: ignore[no-untyped-def]
     """r + sum of p (V(s') - V(own)) of each cell, and the sum of the terms without their signs."""
-    rise, size = np.empty(len(reward)), np.empty(len(reward))
+    advantage, size = np.empty(len(reward)), np.empty(len(reward))
     for c in range(len(reward)):
         here, total, whole = value[own[c]], 0.0, 0.0
         for k in range(start[c], start[c + 1]):
             term = probability[k] * (value[successor[k]] - here)
             total += term
             whole += abs(term)
-        rise[c] = total + reward[c]
+        advantage[c] = total + reward[c]
         size[c] = whole + abs(reward[c])
-    return rise, size
+    return advantage, size
 
 
 @njit(cache=True, nogil=True, error_model="numpy")

@@ -13,7 +13,7 @@ import numpy as np
 from cavsumo.games.model import Floats, Ints
 
 
-def rises(
+def advantages(
     start: Ints,
     successor: Any,
     probability: Floats,
@@ -22,7 +22,7 @@ def rises(
     value: Floats,
     fast: bool,
 ) -> tuple[Floats, Floats]:
-    """The rise of every cell, and the sum of its terms without their signs.
+    """The advantage of every cell, and the sum of its terms without their signs.
 
     Args:
         start: where the outcomes of each cell begin.
@@ -35,12 +35,12 @@ def rises(
         from cavsumo.games.compiled import systems
 
         found: tuple[Floats, Floats]
-        found = systems.rises(start, successor, probability, reward, own, value)
+        found = systems.advantages(start, successor, probability, reward, own, value)
         return found
     terms = value[successor] - np.repeat(value[own], np.diff(start))
     terms *= probability
-    rise, size = (_sums(part, start) for part in (terms, np.abs(terms)))
-    return rise + reward, size + np.abs(reward)
+    advantage, size = (_sums(part, start) for part in (terms, np.abs(terms)))
+    return advantage + reward, size + np.abs(reward)
 
 
 def _sums(terms: Floats, start: Ints) -> Floats:
