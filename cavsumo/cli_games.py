@@ -44,6 +44,13 @@ def add_game(commands: Any) -> None:
     add("--json", dest="as_json", action="store_true", help="print JSON (docs/games.md)")
     add("--picture", type=Path, metavar="FILE", help="draw the game's tree (.png, .svg, .pdf)")
     add("--policy-picture", type=Path, metavar="FILE", help="draw what the policy makes of it")
+    add(
+        "--time-limit",
+        type=float,
+        metavar="S",
+        help="give up after so many seconds, with exit status 3 (default: never; the number of "
+        "steps is bounded in any case)",
+    )
     add("-q", "--quiet", action="store_true", help="no progress")
     solve.set_defaults(command=_solve)
 

@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
+import importlib
+import itertools
 import json
+import os
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from cavsumo.cli import main
@@ -149,3 +153,58 @@ def test_the_examples_of_the_documentation_run(tmp_path: Path) -> None:
     (tmp_path / "game.json").write_text(game, encoding="utf-8")
     assert main(["game", "solve", str(tmp_path / "game.json")]) == 0
     exec(text.split("```python\n")[1].split("```")[0], {})
+
+
+def test_a_time_limit_ends_the_work(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """Exit status 3, one sentence that says what was being done, nothing on stdout."""
+    file = write("pursuit_line_7", tmp_path)
+    assert main(["game", "solve", file, "--json", "--time-limit", "1e-9"]) == 3
+    said = capsys.readouterr()
+    assert said.out == ""
+    assert "not solved within 1e-09 s: it was at " in said.err
+    assert main(["game", "solve", file, "--time-limit", "0"]) == 2
+    assert "--time-limit: expected positive seconds, got 0" in capsys.readouterr().err
+
+
+def test_json_is_all_that_stdout_holds(
+    tmp_path: Path, capfd: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A compiled library that prints while a game is solved is sent to stderr."""
+    solving = importlib.import_module("cavsumo.games.solve")
+
+    def noisy(*_: object) -> object:
+        os.write(1, b" ** On entry to DTRSV  parameter number  6 had an illegal value\n")
+        return start(*_)
+
+    start = solving._start
+    monkeypatch.setattr(solving, "_start", noisy)
+    assert main(["game", "solve", write("figure2_like", tmp_path), "--json"]) == 0
+    said = capfd.readouterr()
+    assert json.loads(said.out)["solvable"] is True
+    assert "DTRSV" in said.err
+
+
+def test_no_library_has_anything_to_print(
+    tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    """Systems of improper pairs made BLAS print; none is solved any more."""
+    from cavsumo.games import from_transitions, solve
+
+    rng = np.random.default_rng(32)
+    transitions = []
+    many, wide = int(rng.integers(1, 4)), int(rng.integers(1, 4))
+    for key in itertools.product(range(41), range(many), range(wide)):
+        to = rng.choice(42, size=int(rng.integers(1, 4)), replace=False)
+        shares = rng.integers(1, 5, size=len(to))
+        transitions.append(
+            (
+                *key,
+                [
+                    (int(t), f"{w}/{shares.sum()}", -int(rng.integers(1, 6)))
+                    for t, w in zip(to, shares, strict=True)
+                ],
+            )
+        )
+    found = solve(from_transitions(42, [41], transitions), "B")
+    assert found.precise
+    assert capfd.readouterr() == ("", "")

@@ -21,8 +21,8 @@ ORDER = """
     games.model games.build games.files games.readings games.segments games.advantages games.regions
     games.components games.solvable games.policies games.chains games.evaluation games.proper
     games.certificate games.flow games.arena games.compiled.bellman games.backups
-    games.matrix_games games.pairs games.plays
-    games.solve games games.drawing games.pictures
+    games.matrix_games games.pairs games.reach games.plays games.turn_based games.simultaneous
+    games.approach games.solve games games.drawing games.pictures
     kinematics geometry paths bodies snapshot fairness roads sumo_poses background
     metrics.following metrics.rss metrics.highway_code metrics.zones metrics.plane
     metrics.encroachment metrics

@@ -6,6 +6,7 @@ import dataclasses
 import io
 import json
 import math
+import os
 import sys
 import threading
 import time
@@ -21,12 +22,13 @@ from rich.table import Table
 from rich.text import Text
 
 from cavsumo.errors import Exit, InputError
+from cavsumo.games.approach import Tell
 from cavsumo.games.files import read_game
 from cavsumo.games.model import Game
 from cavsumo.games.policies import ego_actions
 from cavsumo.games.readings import Reading
 from cavsumo.games.solvable import Solvability
-from cavsumo.games.solve import NotCertified, Solution, Tell, Unsolvable, solve
+from cavsumo.games.solve import NotCertified, Solution, Unsolvable, solve
 
 FORMAT = 1  # of the JSON; raised when a key changes its meaning or goes
 SHOWN = 60  # states in the table
@@ -46,6 +48,7 @@ class Order:
         as_json: as JSON instead of a table.
         picture: file to draw the game's tree into.
         policy_picture: file to draw the policy into.
+        time_limit: seconds after which to give up, None: never.
         quiet: no progress.
     """
 
@@ -56,6 +59,7 @@ class Order:
     as_json: bool
     picture: Path | None
     policy_picture: Path | None
+    time_limit: float | None
     quiet: bool
 
 
@@ -63,12 +67,21 @@ def solve_file(order: Order) -> int:
     """Solve the game in a file and say what was found."""
     if not (math.isfinite(order.precision) and order.precision > 0):
         raise InputError(f"--precision: expected a positive number, got {order.precision:g}")
+    if order.time_limit is not None and not order.time_limit > 0:
+        raise InputError(f"--time-limit: expected positive seconds, got {order.time_limit:g}")
     painters = _painters(order)
     try:
-        with _progress(order.quiet) as tell:
+        with _progress(order.quiet) as tell, _stdout_kept():
             tell("reading the file", math.inf)
             game = read_game(order.file)
-            found = solve(game, order.reading, order.precision, trim=order.trim, tell=tell)
+            found = solve(
+                game,
+                order.reading,
+                order.precision,
+                trim=order.trim,
+                time_limit=order.time_limit,
+                tell=tell,
+            )
         verdict, solution = found.verdict, found
     except Unsolvable as error:
         verdict, solution = error.verdict, None
@@ -80,6 +93,19 @@ def solve_file(order: Order) -> int:
     show = _json if order.as_json else _table
     print(show(order, game, verdict, solution))
     return _status(order, verdict, solution)
+
+
+@contextmanager
+def _stdout_kept() -> Iterator[None]:
+    """Send to stderr what compiled libraries print: stdout has the result and nothing else."""
+    sys.stdout.flush()
+    kept = os.dup(1)
+    os.dup2(2, 1)
+    try:
+        yield
+    finally:
+        os.dup2(kept, 1)
+        os.close(kept)
 
 
 def _status(order: Order, verdict: Solvability, solution: Solution | None) -> int:

@@ -49,11 +49,12 @@ def backup(arena: Arena, value: Floats) -> tuple[Floats, Ints]:
     return np.append(best, 0.0), cell[group]
 
 
-def answers(arena: Arena, value: Floats) -> Ints:
-    """For each group the cell that the one who answers takes."""
+def answers(arena: Arena, value: Floats, advantage: Floats | None = None) -> Ints:
+    """For each group the cell that the one who answers takes; ``advantage`` where it is known."""
     if len(arena.group_cell) - 1 == len(arena.cells):
         return np.arange(len(arena.cells))  # no choice
     _, inner = _operators(arena)
-    advantage = arena.advantages(value)
+    if advantage is None:
+        advantage = arena.advantages(value)
     best = inner.reduceat(advantage, arena.group_cell[:-1])
     return firsts(np.flatnonzero(advantage == best[arena.cell_group]), arena.cell_group)

@@ -72,10 +72,9 @@ def _reached_by_factors(matrix: Any) -> float:
     from scipy.sparse.linalg import splu
 
     system = (identity(matrix.shape[0], format="csr") - matrix).tocsr()
-    try:
-        sweep = splu(tril(system, format="csc"), permc_spec="NATURAL", diag_pivot_thresh=0.0)
-    except RuntimeError:
+    if (system.diagonal() <= 0.0).any():
         return -np.inf
+    sweep = splu(tril(system, format="csc"), permc_spec="NATURAL", diag_pivot_thresh=0.0)
     ones = np.ones(matrix.shape[0])
     steps = np.zeros(matrix.shape[0])
     for _ in range(SWEEPS):

@@ -1,11 +1,15 @@
 """Matrix games: the value and optimal mixed strategies of one simultaneous choice.
 
 The row player maximises, the column player minimises. Where a pure pair is a saddle point the
-answer is exact, 2 x 2 games have a closed form, larger ones are linear programs (HiGHS).
+answer is exact, 2 x 2 games have a closed form. Other small games are solved all at once by the
+theorem of Shapley and Snow (1950): some square part of the matrix makes both players indifferent
+and has optimal strategies. Larger ones, and those where rounding blurs that, are linear programs
+(HiGHS).
 """
 
 from __future__ import annotations
 
+import itertools
 from typing import NamedTuple
 
 import numpy as np
@@ -13,6 +17,7 @@ import numpy as np
 from cavsumo.games.model import Floats
 
 TOLERANCE = 1e-10  # of the linear programs, the least that HiGHS takes
+SMALL = 5  # rows and columns up to which square parts are tried
 
 
 class Answers(NamedTuple):
@@ -40,7 +45,7 @@ def solve(matrices: Floats) -> Answers:
     found.columns[each, column] = 1.0
     mixed = np.flatnonzero(found.value < risk[each, column])
     if len(mixed):
-        parts = _two_by_two(matrices[mixed]) if many == wide == 2 else _programs(matrices[mixed])
+        parts = _two_by_two(matrices[mixed]) if many == wide == 2 else _any_size(matrices[mixed])
         for into, part in zip(found, parts, strict=True):
             into[mixed] = part
     return found
@@ -54,6 +59,55 @@ def _two_by_two(m: Floats) -> Answers:
     rows, columns = up / across[:, None], left / across[:, None]
     value = np.einsum("ki,kij,kj->k", rows, m, columns)
     return Answers(value, rows, columns)
+
+
+def _any_size(matrices: Floats) -> Answers:
+    """By square parts where these do, else by linear programs."""
+    if max(matrices.shape[1:]) > SMALL:
+        return _programs(matrices)
+    found, gap = _by_square_parts(matrices)
+    span = matrices.max(axis=(1, 2)) - matrices.min(axis=(1, 2))
+    blurred = np.flatnonzero(~(gap <= TOLERANCE * span))
+    if len(blurred):
+        for into, part in zip(found, _programs(matrices[blurred]), strict=True):
+            into[blurred] = part
+    return found
+
+
+def _by_square_parts(matrices: Floats) -> tuple[Answers, Floats]:
+    """The best strategies that a square part has, and what they leave open: shape (k,)."""
+    k, many, wide = matrices.shape
+    found = Answers(np.zeros(k), np.zeros((k, many)), np.zeros((k, wide)))
+    gap = np.full(k, np.inf)
+    low = matrices.min(axis=(1, 2), keepdims=True)
+    span = matrices.max(axis=(1, 2), keepdims=True) - low
+    positive = (matrices - low) / span + 1.0  # then the part that has the strategies is regular
+    for size in range(2, min(many, wide) + 1):
+        for rows in itertools.combinations(range(many), size):
+            for columns in itertools.combinations(range(wide), size):
+                x, y = _indifferent(positive[:, rows][:, :, columns])
+                full = np.zeros((k, many)), np.zeros((k, wide))
+                full[0][:, rows], full[1][:, columns] = x, y
+                least = np.einsum("ki,kij->kj", full[0], matrices).min(axis=1)
+                most = np.einsum("kij,kj->ki", matrices, full[1]).max(axis=1)
+                better = np.flatnonzero(most - least < gap)  # not where there is no answer: NaN
+                gap[better] = (most - least)[better]
+                found.rows[better], found.columns[better] = full[0][better], full[1][better]
+    value = np.einsum("ki,kij,kj->k", found.rows, matrices, found.columns)
+    return found._replace(value=value), gap
+
+
+def _indifferent(parts: Floats) -> tuple[Floats, Floats]:
+    """Weights of rows and of columns that make the other player indifferent; NaN where none do."""
+    regular = np.abs(np.linalg.det(parts)) > 1e-12
+    inverse = np.full_like(parts, np.nan)
+    inverse[regular] = np.linalg.inv(parts[regular])
+    x, y = inverse.sum(axis=1), inverse.sum(axis=2)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        x, y = x / x.sum(axis=1, keepdims=True), y / y.sum(axis=1, keepdims=True)
+    negative = (x < 0).any(axis=1) | (y < 0).any(axis=1)
+    x[negative], y[negative] = np.nan, np.nan
+    return x, y
 
 
 def _programs(matrices: Floats) -> Answers:
@@ -87,7 +141,7 @@ def _program(matrix: Floats) -> tuple[float, Floats, Floats]:
 
 
 def _distribution(weights: Floats) -> Floats:
-    """Weights that are not negative and sum to 1."""
-    weights = np.maximum(weights, 0.0)
+    """Weights that are not negative and sum to 1; those within the tolerance of 0 are 0."""
+    weights = np.where(weights > TOLERANCE, weights, 0.0)
     shares: Floats = weights / weights.sum()
     return shares

@@ -1,8 +1,10 @@
-"""The value of one pair of policies: a linear system (I - P) V = r, solved to a given residual.
+"""The value of one proper pair of policies: a linear system (I - P) V = r.
 
 Small systems by a sparse factorisation, large ones by BiCGSTAB preconditioned with one
 Gauss-Seidel sweep, which in the arena's order carries news from the goals through the game.
-A pair that never reaches a goal from somewhere has a singular system: then nothing is returned.
+I - P is regular because a goal is reached from every state (``reach``). How accurate a value is,
+is judged by the rewards and the expected number of steps t, (I - P) t = 1: |V| is at most the
+largest reward times t, and floats place it no better than that times their precision.
 """
 
 from __future__ import annotations
@@ -15,11 +17,13 @@ from typing import Any
 import numpy as np
 
 from cavsumo.games.advantages import advantages
+from cavsumo.games.components import EPSILON
 from cavsumo.games.model import Floats
 
 DIRECT = 1500  # states up to which systems are factorised
 FALLBACK = 5000  # states up to which they are where the iteration fails
 ROUNDS, ITERATIONS = 4, 80
+STEPS_OFF = 1e-2  # by which the expected number of steps may be wrong, relative
 
 
 def pair_value(
@@ -31,10 +35,10 @@ def pair_value(
     precise: bool = True,
     fast: bool = False,
 ) -> Floats | None:
-    """V with |r + P V - V| <= residual in every state, or the best that can be had.
+    """V with |r + P V - V| <= residual in every state, or as close as floats allow.
 
     Args:
-        transitions: P as CSR, square.
+        transitions: P as CSR, square; the last state can be reached from every other.
         reward: r.
         start: a guess.
         residual: wanted, absolute.
@@ -42,18 +46,18 @@ def pair_value(
         fast: by compiled loops.
 
     Returns:
-        None when the system seems singular.
+        None when no such value was found.
     """
     pair = _Pair(transitions, reward, fast)
     with warnings.catch_warnings(), np.errstate(all="ignore"):
-        warnings.simplefilter("ignore")  # singular systems are answered below
+        warnings.simplefilter("ignore")  # what is not accurate is not returned
+        if len(reward) > DIRECT:
+            found = _refined(pair, start, residual, precise, _krylov(pair))
+            if found is not None or len(reward) > FALLBACK:
+                return found
         try:
-            if len(reward) > DIRECT:
-                found = _refined(pair, start, residual, precise, _krylov(pair))
-                if found is not None or len(reward) > FALLBACK:
-                    return found
             return _refined(pair, start, residual, precise, _factorised(pair))
-        except RuntimeError:  # exactly singular
+        except RuntimeError:  # probabilities so near to 1 that rounding makes the system singular
             return None
 
 
@@ -82,7 +86,7 @@ class _Pair:
 def _refined(
     pair: _Pair, start: Floats, residual: float, precise: bool, solve: Any
 ) -> Floats | None:
-    """Corrections until the residual is small or does not shrink any more."""
+    """Corrections until the residual is small or does not shrink any more; then it is judged."""
     value, left = start, pair.advantage(start)
     size = float(np.abs(left).max(initial=0.0))
     first, wanted = size, residual if precise else max(residual, 1e-2 * size)
@@ -95,7 +99,23 @@ def _refined(
         if not size_now < 0.9 * size:
             break
         value, left, size = corrected, left_now, size_now
-    return value if size <= max(wanted, 4.0 * coarseness(value), 0.2 * first) else None
+    if size <= wanted:
+        return value
+    most = _largest_value(pair, solve)
+    if not np.abs(value).max(initial=0.0) <= 2.0 * most:
+        return None
+    return value if size <= max(8.0 * EPSILON * most, 0.2 * first) else None
+
+
+def _largest_value(pair: _Pair, solve: Any) -> float:
+    """The largest reward times the largest expected number of steps; 0 where that is not found."""
+    ones = np.append(np.ones(len(pair.reward) - 1), 0.0)
+    counting = _Pair(pair.transitions, ones, pair.fast)
+    steps = ones + solve(counting.advantage(ones), STEPS_OFF)
+    off = float(np.abs(counting.advantage(steps)).max(initial=0.0))
+    if not (off <= STEPS_OFF and steps.min(initial=0.0) >= 0.0):
+        return 0.0
+    return float(np.abs(pair.reward).max(initial=0.0) * steps.max(initial=0.0)) / (1.0 - STEPS_OFF)
 
 
 def coarseness(value: Floats) -> float:

@@ -1,46 +1,45 @@
 """Expectiminimax values and policies (seed, eq. 3), between certified bounds.
 
 1. Decide whether the game is solvable; refuse it with a witness when it is not.
-2. Start from the pair of policies that a few sweeps from V = 0 come to; where that pair does not
-   reach a goal, from a proper tester policy, the one by which the almost-sure region was found.
-3. Repeat: a Gauss-Seidel sweep of the Bellman operator T, then jump to the value of the pair of
-   policies that attains it (policy iteration on both players at once). Where a pair has no value
-   or nothing improves, more sweeps come between jumps: value iteration converges from anywhere.
+2. Start from the value of the pair of policies that a few sweeps from V = 0 come to, made proper
+   where it does not reach a goal (``plays``).
+3. Approach the fixed point of the Bellman operator T (``approach``).
 4. Solve the game once more with every reward lowered by a little e, and once with it raised: when
    the residuals are below e, the two solutions satisfy the inequalities of ``certificate``, so
    they enclose the value whatever happened before. e follows from the precision that is asked
    for and the expected number of steps, as each step shifts the value by e.
 
 Nothing relies on a small change of V per iteration: where goals are approached slowly, that says
-nothing about how far V is from the value.
+nothing about how far V is from the value. Every loop is bounded; a solver that does not get there
+says how far it came (``NotCertified``).
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import time
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from cavsumo.errors import CavsumoError
+from cavsumo.games.approach import Tell, approach
+from cavsumo.games.arena import arena
 from cavsumo.games.certificate import Certificate, advantages_of, holds
+from cavsumo.games.components import EPSILON
 from cavsumo.games.flow import best_order
-from cavsumo.games.model import Bools, Floats, Game
+from cavsumo.games.model import Bools, Floats, Game, Ints
 from cavsumo.games.pairs import coarseness
-from cavsumo.games.plays import Play, play_of, time_of, value_of
+from cavsumo.games.plays import Play, made_proper, time_of, value_of
 from cavsumo.games.readings import Reading
 from cavsumo.games.regions import keeping
+from cavsumo.games.simultaneous import Simultaneous
 from cavsumo.games.solvable import Solvability, solvability
+from cavsumo.games.turn_based import TurnBased
 
 PRECISION = 1e-6
 FIRST_SWEEPS = 4  # from V = 0
-JUMPS = 400  # to the value of a pair, at most, in each of the three solutions
-SWEEPS = 512  # between two jumps, at most
-PATIENCE = 4  # jumps in a row that do not halve the residual, before there are more sweeps
 ATTEMPTS = 12  # at a certificate
-NEAR = 100.0  # times the residual wanted, within which there are only jumps
-Tell = Callable[[str, float], None]  # called with what is being done and the residual
 
 
 class Unsolvable(CavsumoError):
@@ -52,7 +51,7 @@ class Unsolvable(CavsumoError):
 
 
 class NotCertified(CavsumoError):
-    """No bounds could be proven in floating point."""
+    """No bounds could be proven in floats, or not in the time given; says how far it came."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -102,6 +101,7 @@ def solve(
     precision: float = PRECISION,
     *,
     trim: bool = False,
+    time_limit: float | None = None,
     tell: Tell = _silent,
 ) -> Solution:
     """Bounds on the value of every state, at most ``precision`` apart, with optimal policies.
@@ -110,29 +110,52 @@ def solve(
         precision: absolute. Where floats are too coarse for it the bounds are as close as they
             allow (``Solution.precise``).
         trim: solve what can be solved: states from which no goal can be forced get -inf.
+        time_limit: seconds after which to give up, looked at between steps.
         tell: called now and then.
 
     Raises:
         Unsolvable: the game is not strongly solvable in this reading.
-        NotCertified: the bounds found could not be proven.
+        NotCertified: the bounds found could not be proven, or not within the time limit.
     """
     reading = Reading(reading)
     if not precision > 0:
         raise ValueError(f"precision must be positive, got {precision!r}")
+    tell = _within(time_limit, tell)
     tell("where goals can be forced", np.inf)
     verdict = solvability(game, reading)
     if verdict.cycle is not None or (verdict.trap is not None and not trim):
         raise Unsolvable(game, verdict)
     inside = verdict.proper.inside
-    kept = None if inside.all() else keeping(game, reading, inside)
     tell("in which order values spread", np.inf)
     order = best_order(game, verdict.proper.layer, verdict.proper.moves)
-    play = play_of(game, reading, order, kept)
-    if not play.arena.size:
+    if not len(order):
         return Solution(verdict, _trivial(game, reading, inside), precision)
-    value = _start(game, verdict, play, tell)
-    certificate = _certified(game, verdict, play, value, precision, tell)
+    kept = None if inside.all() else keeping(game, reading, inside)
+    play = _play(game, reading, order, kept, verdict.proper.moves)
+    certificate = _certified(game, verdict, play, _start(play), precision, tell)
     return Solution(verdict, certificate, precision)
+
+
+def _within(limit: float | None, tell: Tell) -> Tell:
+    """A ``tell`` that ends the work when its time is over."""
+    if limit is None:
+        return tell
+    end = time.monotonic() + limit
+
+    def told(doing: str, left: float) -> None:
+        if time.monotonic() > end:
+            how_far = f", residual {left:.1e}" if np.isfinite(left) else ""
+            raise NotCertified(f"not solved within {limit:g} s: it was at {doing}{how_far}")
+        tell(doing, left)
+
+    return told
+
+
+def _play(game: Game, reading: Reading, states: Ints, kept: Bools | None, moves: Bools) -> Play:
+    """The states of a game, in the order of sweeps, in a reading."""
+    if reading is Reading.B:
+        return Simultaneous(game, states, kept, moves)
+    return TurnBased(arena(game, reading, states, kept), moves)
 
 
 def _trivial(game: Game, reading: Reading, inside: Bools) -> Certificate:
@@ -141,25 +164,16 @@ def _trivial(game: Game, reading: Reading, inside: Bools) -> Certificate:
     return Certificate(reading, value, value, none, none)
 
 
-def _start(game: Game, verdict: Solvability, play: Play, tell: Tell) -> Floats:
-    """The value of the pair of policies that a few sweeps come to, where that reaches a goal.
-
-    Else nearly the value of the tester policy by which the region was found, against its worst ego.
-    In reading B: 0.
-    """
+def _start(play: Play) -> Floats:
+    """Nearly the value of the pair of policies that a few sweeps come to, made proper."""
     value = np.zeros(play.arena.size + 1)
-    if verdict.reading is Reading.B:
-        return value
-    none, scale = np.zeros_like(value), _scale(play)
-    for _ in range(FIRST_SWEEPS):
+    none = np.zeros_like(value)
+    for _ in range(FIRST_SWEEPS if play.sweeps else 0):
         play.sweep(value, none)
     _, pair = play.backup(value)
-    jump = value_of(play, pair, value, none, 0.1 * scale, precise=False)
-    if jump is not None:
-        return jump
-    first = play_of(game, verdict.reading, play.arena.states, verdict.proper.moves)
-    value, *_ = _approach(first, none, none, 0.1 * scale, "a first policy", tell, jumps=8)
-    return value
+    proper = made_proper(play, pair, value)
+    jump = value_of(play, proper, value, none, 0.1 * _scale(play), precise=False)
+    return value if jump is None else jump
 
 
 def _scale(play: Play) -> float:
@@ -172,10 +186,31 @@ def _certified(
 ) -> Certificate:
     """Bounds that hold, as close as was asked for if floats allow it."""
     none = np.zeros_like(value)
-    value, pair, left = _approach(play, value, none, 1e-4 * _scale(play), "the value", tell)
-    time = time_of(play, pair)
+    scale = _scale(play)
+    value, pair, left = approach(play, value, none, 1e-4 * scale, "the value", tell)
+    time = time_of(play, made_proper(play, pair, value))
     steps = np.append(np.ones(play.arena.size), 0.0) if time is None else time
+    if left > 1e-3 * scale + 64.0 * EPSILON * scale * float(steps.max()):
+        raise NotCertified(
+            f"no bounds could be proven: the Bellman equation was met up to {left:.1e} only, with "
+            f"rewards up to {scale:.3g}"
+        )
     noise = _noise(game, verdict.reading, play, value, left)
+    return _closest(game, verdict, play, value, pair, steps, noise, precision, tell)
+
+
+def _closest(
+    game: Game,
+    verdict: Solvability,
+    play: Play,
+    value: Floats,
+    pair: Any,
+    steps: Floats,
+    noise: Floats,
+    precision: float,
+    tell: Tell,
+) -> Certificate:
+    """Bounds tried with one e after another, until they hold and are close enough."""
     best, e = None, precision / (3.0 * float(steps.max()))
     for _ in range(ATTEMPTS):
         e = max(e, 1.25 * coarseness(value))
@@ -233,10 +268,10 @@ def _bounds(
     """The solutions of the game with rewards lowered and raised by e and some noise."""
     shift = np.append(np.maximum(e, noise[:-1]), 0.0)
     residual = max(0.5 * e, min(0.8 * e, coarseness(value)))
-    low, low_pair, _ = _approach(
+    low, low_pair, _ = approach(
         play, value - e * steps, -shift, residual, "lower bound", tell, near=pair
     )
-    high, high_pair, _ = _approach(
+    high, high_pair, _ = approach(
         play, low + 2.0 * e * steps, shift, residual, "upper bound", tell, near=low_pair
     )
     lower, upper = (np.where(verdict.proper.inside, 0.0, -np.inf) for _ in range(2))
@@ -248,48 +283,3 @@ def _bounds(
         play.tester(game, low_pair, low),
         play.ego(game, high_pair, high),
     )
-
-
-def _approach(
-    play: Play,
-    value: Floats,
-    shift: Floats,
-    residual: float,
-    doing: str,
-    tell: Tell,
-    *,
-    near: Any = None,
-    jumps: int = JUMPS,
-) -> tuple[Floats, Any, float]:
-    """V with |T V + shift - V| <= residual if it can be had, the pair that attains T V, the rest.
-
-    ``near`` is the pair that V is nearly the value of, if one is known: then there are no sweeps
-    unless jumps do not help, as a sweep adds up rounding errors on its way. Returns the best V that
-    was met.
-    """
-    sweeps, before, stuck = play.sweeps if near is None else 0, near, 0
-    best: tuple[Floats, Any, float] = (value, None, np.inf)
-    for _ in range(jumps):
-        advantage, pair = play.backup(value)
-        advantage += shift
-        left = float(np.abs(advantage).max())
-        tell(doing, left)
-        stuck = 0 if left < 0.5 * best[2] else stuck + 1
-        if left < best[2] or best[1] is None:
-            best = (value.copy(), pair, left)
-        if left <= residual or (stuck > 6 and left <= 3.0 * residual):
-            break
-        jump = value_of(play, pair, value, shift, 0.25 * residual, _same(pair, before))
-        before = pair
-        if jump is None or stuck > PATIENCE:
-            sweeps, stuck = min(SWEEPS, max(1, 2 * sweeps)), 0
-        value = value + advantage if jump is None else jump
-        if jump is None or left > NEAR * residual:
-            for _ in range(sweeps):
-                play.sweep(value, shift)
-    return best
-
-
-def _same(pair: Any, before: Any) -> bool:
-    """Whether two pairs of policies of readings A and C are the same."""
-    return isinstance(pair, np.ndarray) and before is not None and bool((pair == before).all())

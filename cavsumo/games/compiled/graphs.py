@@ -1,4 +1,4 @@
-"""Attractors, as in ``regions``, ranges, as in ``parts``, cells laid out, as in ``arena``."""
+"""Loops of ``regions`` (attractors), ``segments``, ``arena`` (cells laid out) and ``reach``."""
 
 from __future__ import annotations
 
@@ -71,3 +71,34 @@ def gathered(start, successor, probability, which, number):  # type: ignore[no-u
             chance[i] = probability[k]
             i += 1
     return begin, to, chance
+
+
+@njit(cache=True, nogil=True)
+def reaching(start, column):  # type: ignore[no-untyped-def]
+    """As ``reach.reaching``: from the last state backward, over the entries in each column."""
+    n = len(start) - 1
+    begin = np.zeros(n + 1, dtype=np.int64)
+    for k in range(start[n]):
+        begin[column[k] + 1] += 1
+    for s in range(n):
+        begin[s + 1] += begin[s]
+    place = begin[:-1].copy()
+    source = np.empty(start[n], dtype=np.int32)
+    for s in range(n):
+        for k in range(start[s], start[s + 1]):
+            source[place[column[k]]] = s
+            place[column[k]] += 1
+    found = np.zeros(n, dtype=np.bool_)
+    waiting = np.empty(n, dtype=np.int64)
+    found[n - 1] = True
+    waiting[0], count, done = n - 1, 1, 0
+    while done < count:
+        s = waiting[done]
+        done += 1
+        for k in range(begin[s], begin[s + 1]):
+            t = source[k]
+            if not found[t]:
+                found[t] = True
+                waiting[count] = t
+                count += 1
+    return found
