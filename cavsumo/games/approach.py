@@ -59,29 +59,39 @@ def approach(
     tell: Tell,
     *,
     near: Any = None,
+    steps: Floats | None = None,
 ) -> Approach:
     """V with |T V + shift - V| <= residual if it can be had.
 
     ``near`` is the pair that V is nearly the value of, if one is known: then there are no sweeps,
-    as a sweep adds up rounding errors on its way.
+    as a sweep adds up rounding errors on its way. ``steps``: as in ``pairs``.
     """
-    best = _by_jumps(play, value, shift, residual, doing, tell, near)
+    best = _by_jumps(play, value, shift, residual, doing, tell, near, steps)
+    if best.left <= 3.0 * residual:
+        return best
     held = play.improved(play.first, best.value, residual)  # a guess, of any worth
     for _ in range(TURNS):
-        if best.left <= 3.0 * residual:
-            break
         found, better = _by_policies(play, held, best.value, shift, residual, doing, tell)
         best = min(best, found, key=lambda one: one.left)
         if better is None or best.left <= 3.0 * residual:
             break
         held = better
-        again = _by_jumps(play, found.value, shift, residual, doing, tell, found.pair)
+        again = _by_jumps(play, found.value, shift, residual, doing, tell, found.pair, steps)
         best = min(best, again, key=lambda one: one.left)
+        if best.left <= 3.0 * residual:
+            break
     return best
 
 
 def _by_jumps(
-    play: Play, value: Floats, shift: Floats, residual: float, doing: str, tell: Tell, near: Any
+    play: Play,
+    value: Floats,
+    shift: Floats,
+    residual: float,
+    doing: str,
+    tell: Tell,
+    near: Any,
+    steps: Floats | None,
 ) -> Approach:
     """Jumps until the residual is small, or is not halved any more."""
     sweeps, before, stuck = play.sweeps if near is None else 0, near, 0
@@ -97,7 +107,8 @@ def _by_jumps(
         if left <= residual or stuck > PATIENCE:
             break
         proper = made_proper(play, pair, value)
-        jump = value_of(play, proper, value, shift, 0.25 * residual, _same(proper, before))
+        same = _same(proper, before)
+        jump = value_of(play, proper, value, shift, 0.25 * residual, same, steps)
         before = proper
         value = value + advantage if jump is None else jump
         if jump is None or left > NEAR * residual:

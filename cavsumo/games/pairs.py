@@ -23,7 +23,7 @@ from cavsumo.games.model import Floats
 DIRECT = 1500  # states up to which systems are factorised
 FALLBACK = 5000  # states up to which they are where the iteration fails
 ROUNDS, ITERATIONS = 4, 80
-STEPS_OFF = 1e-2  # by which the expected number of steps may be wrong, relative
+STEPS_OFF = 0.5  # by which (I - P) t may miss 1; then t / (1 - 0.5) bounds the expected steps
 
 
 def pair_value(
@@ -34,6 +34,7 @@ def pair_value(
     *,
     precise: bool = True,
     fast: bool = False,
+    steps: Floats | None = None,
 ) -> Floats | None:
     """V with |r + P V - V| <= residual in every state, or as close as floats allow.
 
@@ -44,6 +45,7 @@ def pair_value(
         residual: wanted, absolute.
         precise: otherwise a hundredth of the guess's residual will do.
         fast: by compiled loops.
+        steps: nearly the expected numbers of steps, if they are known of a pair like this one.
 
     Returns:
         None when no such value was found.
@@ -52,11 +54,11 @@ def pair_value(
     with warnings.catch_warnings(), np.errstate(all="ignore"):
         warnings.simplefilter("ignore")  # what is not accurate is not returned
         if len(reward) > DIRECT:
-            found = _refined(pair, start, residual, precise, _krylov(pair))
+            found = _refined(pair, start, residual, precise, _krylov(pair), steps)
             if found is not None or len(reward) > FALLBACK:
                 return found
         try:
-            return _refined(pair, start, residual, precise, _factorised(pair))
+            return _refined(pair, start, residual, precise, _factorised(pair), steps)
         except RuntimeError:  # probabilities so near to 1 that rounding makes the system singular
             return None
 
@@ -84,7 +86,7 @@ class _Pair:
 
 
 def _refined(
-    pair: _Pair, start: Floats, residual: float, precise: bool, solve: Any
+    pair: _Pair, start: Floats, residual: float, precise: bool, solve: Any, steps: Floats | None
 ) -> Floats | None:
     """Corrections until the residual is small or does not shrink any more; then it is judged."""
     value, left = start, pair.advantage(start)
@@ -101,21 +103,28 @@ def _refined(
         value, left, size = corrected, left_now, size_now
     if size <= wanted:
         return value
-    most = _largest_value(pair, solve)
+    most = _largest_value(pair, solve, steps)
     if not np.abs(value).max(initial=0.0) <= 2.0 * most:
         return None
     return value if size <= max(8.0 * EPSILON * most, 0.2 * first) else None
 
 
-def _largest_value(pair: _Pair, solve: Any) -> float:
+def _largest_value(pair: _Pair, solve: Any, steps: Floats | None) -> float:
     """The largest reward times the largest expected number of steps; 0 where that is not found."""
     ones = np.append(np.ones(len(pair.reward) - 1), 0.0)
     counting = _Pair(pair.transitions, ones, pair.fast)
-    steps = ones + solve(counting.advantage(ones), STEPS_OFF)
+    if steps is None or not _bounds_steps(counting, steps):
+        steps = ones + solve(counting.advantage(ones), 0.2 * STEPS_OFF)
+        if not _bounds_steps(counting, steps):
+            return 0.0
+    most = np.abs(pair.reward).max(initial=0.0) * steps.max(initial=0.0)
+    return float(most) / (1.0 - STEPS_OFF)
+
+
+def _bounds_steps(counting: _Pair, steps: Floats) -> bool:
+    """Whether (I - P) t is 1 but for ``STEPS_OFF`` in every state, and t not negative."""
     off = float(np.abs(counting.advantage(steps)).max(initial=0.0))
-    if not (off <= STEPS_OFF and steps.min(initial=0.0) >= 0.0):
-        return 0.0
-    return float(np.abs(pair.reward).max(initial=0.0) * steps.max(initial=0.0)) / (1.0 - STEPS_OFF)
+    return off <= STEPS_OFF and bool(steps.min(initial=0.0) >= 0.0)
 
 
 def coarseness(value: Floats) -> float:

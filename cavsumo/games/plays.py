@@ -30,12 +30,14 @@ class Play(Protocol):
     Attributes:
         arena: the game laid out.
         sweeps: how many come before each jump to the value of a pair.
-        first: a proper policy of the tester, held against any ego.
     """
 
     arena: Arena
     sweeps: int
-    first: Any
+
+    @property
+    def first(self) -> Any:
+        """A proper policy of the tester, held against any ego."""
 
     def sweep(self, value: Floats, shift: Floats) -> None:
         """V <- T V + shift, in place, from the goals outward."""
@@ -78,15 +80,22 @@ def made_proper(play: Play, pair: Any, value: Floats) -> Any:
 
 
 def value_of(
-    play: Play, pair: Any, start: Floats, shift: Floats, residual: float, precise: bool
+    play: Play,
+    pair: Any,
+    start: Floats,
+    shift: Floats,
+    residual: float,
+    precise: bool,
+    steps: Floats | None = None,
 ) -> Floats | None:
     """The value of a proper pair with rewards raised by the ``shift`` of their state.
 
     None when it is not found accurately enough.
     """
     transitions, reward = play.system(pair)
+    fast = play.arena.fast
     return pair_value(
-        transitions, reward + shift, start, residual, precise=precise, fast=play.arena.fast
+        transitions, reward + shift, start, residual, precise=precise, fast=fast, steps=steps
     )
 
 

@@ -76,8 +76,7 @@ class Simultaneous:
         """The advantage of every action of the ego against the weights of the rows."""
         a = self.arena
         mixed = rows[a.cell_group] * a.advantages(value)
-        worth: Floats = np.bincount(self._column, mixed, int(self._columns[-1]))
-        return worth
+        return np.bincount(self._column, mixed, int(self._columns[-1])).astype(float)
 
     def improved(self, held: Floats, value: Floats, margin: float) -> Floats:
         """See ``Play``."""

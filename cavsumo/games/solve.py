@@ -269,10 +269,17 @@ def _bounds(
     shift = np.append(np.maximum(e, noise[:-1]), 0.0)
     residual = max(0.5 * e, min(0.8 * e, coarseness(value)))
     low, low_pair, _ = approach(
-        play, value - e * steps, -shift, residual, "lower bound", tell, near=pair
+        play, value - e * steps, -shift, residual, "lower bound", tell, near=pair, steps=steps
     )
     high, high_pair, _ = approach(
-        play, low + 2.0 * e * steps, shift, residual, "upper bound", tell, near=low_pair
+        play,
+        low + 2.0 * e * steps,
+        shift,
+        residual,
+        "upper bound",
+        tell,
+        near=low_pair,
+        steps=steps,
     )
     lower, upper = (np.where(verdict.proper.inside, 0.0, -np.inf) for _ in range(2))
     lower[play.arena.states], upper[play.arena.states] = low[:-1], high[:-1]

@@ -6,6 +6,7 @@ commits to in each state in reading A, its answer in each group in reading C.
 
 from __future__ import annotations
 
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -31,11 +32,16 @@ class TurnBased:
             from cavsumo.games.compiled import bellman
 
             self._bellman = bellman
-        allowed = np.flatnonzero(moves[arena.cells])
-        if arena.reading is Reading.A:
-            self.first = arena.cell_group[firsts(allowed, arena.cell_state)]
-        else:
-            self.first = firsts(allowed, arena.cell_group)
+        self._moves = moves
+
+    @cached_property
+    def first(self) -> Ints:
+        """See ``Play``; most games are solved without it."""
+        a = self.arena
+        allowed = np.flatnonzero(self._moves[a.cells])
+        if a.reading is Reading.A:
+            return a.cell_group[firsts(allowed, a.cell_state)]
+        return firsts(allowed, a.cell_group)
 
     def sweep(self, value: Floats, shift: Floats) -> None:
         """See ``Play``."""
