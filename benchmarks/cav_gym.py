@@ -21,22 +21,23 @@ from pathlib import Path
 import numpy as np
 
 from cavsumo.agents.walking import steer_to
-from cavsumo.batch import run_batch
-from cavsumo.bodies import PEDESTRIAN, Body
-from cavsumo.executors import local_executor
-from cavsumo.geometry import Box, overlap, zone_entered
-from cavsumo.jobs import job
-from cavsumo.kinematics import step_floats
-from cavsumo.outcomes import is_test
-from cavsumo.roads import Start
-from cavsumo.scenario import BatchPlan, plan_from
-from cavsumo.setting import Setting, prepare
-from cavsumo.site import Site
-from cavsumo.snapshot import BodyState
-from cavsumo.starts import draw_starts
-from cavsumo.statistics import rate
-from cavsumo.summary import interval, percent
-from cavsumo.tally import tallied
+from cavsumo.batch.dispatch import run_batch
+from cavsumo.batch.executors import local_executor
+from cavsumo.batch.jobs import job
+from cavsumo.batch.prepared import Setting, prepare
+from cavsumo.batch.summary import interval, percent
+from cavsumo.batch.tally import tallied
+from cavsumo.model.bodies import PEDESTRIAN, Body
+from cavsumo.model.carriageway import Start
+from cavsumo.model.geometry import Box, overlap
+from cavsumo.model.kinematics import step_floats
+from cavsumo.model.scenario import BatchPlan, plan_from
+from cavsumo.model.snapshot import BodyState
+from cavsumo.model.stopping_zones import zone_entered
+from cavsumo.network.pedestrian_starts import draw_starts
+from cavsumo.network.site import Site
+from cavsumo.results.rows import is_test
+from cavsumo.results.statistics import rate
 
 ROOT = Path(__file__).resolve().parent.parent
 SETTINGS = {

@@ -28,16 +28,17 @@ from typing import Any, ClassVar, NamedTuple
 
 import libsumo
 
+from cavsumo.agents.casting import make_agents
 from cavsumo.assertions.base import ASSERTIONS, Assertion
-from cavsumo.contacts import Contact
-from cavsumo.geometry import gap, in_frame, overlap
-from cavsumo.jobs import job, make_agents
-from cavsumo.scenario import plan_from
-from cavsumo.scene import Scene
-from cavsumo.setting import prepare
-from cavsumo.simulator import play
-from cavsumo.snapshot import BodyState, Snapshot
-from cavsumo.theatre import Theatre
+from cavsumo.assertions.contacts import Contact
+from cavsumo.batch.episode_runner import Theatre
+from cavsumo.batch.jobs import job
+from cavsumo.batch.prepared import prepare
+from cavsumo.model.geometry import gap, in_frame, overlap
+from cavsumo.model.scenario import plan_from
+from cavsumo.model.scene import Scene
+from cavsumo.model.snapshot import BodyState, Snapshot
+from cavsumo.simulation.loop import play
 
 ROOT = Path(__file__).resolve().parent.parent
 NETWORKS = ("crossing", "junction", "pedestrians")

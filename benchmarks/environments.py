@@ -20,12 +20,12 @@ from typing import Any
 import numpy as np
 
 from cavsumo.agents import AGENTS, Agent
-from cavsumo.bodies import Action, kind_named
 from cavsumo.envs.tester import TesterEnv
-from cavsumo.jobs import episode_seed
-from cavsumo.simulator import Performance
-from cavsumo.snapshot import Snapshot
-from cavsumo.stage import Stage, set_stage
+from cavsumo.model.bodies import Action, kind_named
+from cavsumo.model.seeds import episode_seed
+from cavsumo.model.snapshot import Snapshot
+from cavsumo.simulation.loop import Performance
+from cavsumo.simulation.setup import Stage, set_stage
 
 ROOT = Path(__file__).resolve().parent.parent
 ROUNDS = 3  # the fastest counts

@@ -23,13 +23,14 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
+from cavsumo.agents.casting import make_agents
+from cavsumo.batch.prepared import prepare
 from cavsumo.egos import Acceleration, Ego, make_ego
-from cavsumo.egos.protocol import Observations, hello
-from cavsumo.jobs import episode_seed, make_agents
-from cavsumo.scenario import plan_from
-from cavsumo.setting import prepare
-from cavsumo.simulator import play
-from cavsumo.stage import set_stage
+from cavsumo.egos.external.protocol import Observations, hello
+from cavsumo.model.scenario import plan_from
+from cavsumo.model.seeds import episode_seed
+from cavsumo.simulation.loop import play
+from cavsumo.simulation.setup import set_stage
 
 ROOT = Path(__file__).resolve().parent.parent
 EXAMPLE = ROOT / "examples" / "egos" / "stop_for_pedestrians.py"

@@ -14,13 +14,13 @@ from collections import Counter
 
 import cav_gym
 
-from cavsumo.batch import run_batch
-from cavsumo.executors import local_executor
-from cavsumo.outcomes import Row, is_test
-from cavsumo.scenario import plan_from
-from cavsumo.setting import Setting, prepare
-from cavsumo.statistics import rate
-from cavsumo.summary import interval, percent
+from cavsumo.batch.dispatch import run_batch
+from cavsumo.batch.executors import local_executor
+from cavsumo.batch.prepared import Setting, prepare
+from cavsumo.batch.summary import interval, percent
+from cavsumo.model.scenario import plan_from
+from cavsumo.results.rows import Row, is_test
+from cavsumo.results.statistics import rate
 
 
 def main() -> None:

@@ -20,12 +20,12 @@ from typing import Any
 
 from chaos import children
 
-from cavsumo.jobs import head
-from cavsumo.outcomes import Outcome
-from cavsumo.recorder import Recorder
-from cavsumo.scenario import plan_from
-from cavsumo.session import Session
-from cavsumo.setting import manifest, prepare
+from cavsumo.batch.batch_run import Session
+from cavsumo.batch.jobs import head
+from cavsumo.batch.prepared import manifest, prepare
+from cavsumo.model.scenario import plan_from
+from cavsumo.results.rows import Outcome
+from cavsumo.results.writing import Recorder
 
 NET = Path(__file__).resolve().parent.parent / "networks" / "pedestrians.net.xml"
 

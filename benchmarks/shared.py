@@ -19,12 +19,12 @@ from pathlib import Path
 
 from throughput import bare_loop, to_bare
 
-from cavsumo import simulator
-from cavsumo.jobs import Job, job
-from cavsumo.outcomes import is_test
-from cavsumo.scenario import SHARED_BY, plan_from
-from cavsumo.setting import prepare
-from cavsumo.theatre import Theatre
+from cavsumo.batch.episode_runner import Theatre
+from cavsumo.batch.jobs import Job, job
+from cavsumo.batch.prepared import prepare
+from cavsumo.model.scenario import SHARED_BY, plan_from
+from cavsumo.results.rows import is_test
+from cavsumo.simulation import loop
 
 ROOT = Path(__file__).resolve().parent.parent
 
@@ -78,7 +78,7 @@ def report(name: str, seconds: float, bare: float, episodes: int, steps: Counter
 def bare(theatre: Theatre, jobs: list[Job], spent: Counter[str], steps: Counter[str]) -> None:
     """The bare loop along the tracks of the fresh episodes."""
     for one in jobs:
-        frames = simulator.play(theatre.stage, theatre._cast(one), one.seed, record=True).frames
+        frames = loop.play(theatre.stage, theatre._cast(one), one.seed, record=True).frames
         tracks = [[to_bare(t) for t in s.testers] for s in frames]
         begun = time.perf_counter()
         bare_loop(theatre.stage.world, one.seed, tracks)

@@ -17,15 +17,15 @@ from xml.etree import ElementTree
 
 import libsumo
 
-from cavsumo.bodies import CAR, Body
-from cavsumo.contacts import ContactMonitor
-from cavsumo.criticality import Course
-from cavsumo.roads import Approach
-from cavsumo.scenario import plan_from
-from cavsumo.setting import prepare
-from cavsumo.site import Site
-from cavsumo.snapshot import BodyState, Snapshot
-from cavsumo.sumo_poses import from_sumo
+from cavsumo.assertions.contacts import ContactMonitor
+from cavsumo.assertions.criticality_monitor import Course
+from cavsumo.batch.prepared import prepare
+from cavsumo.model.bodies import CAR, Body
+from cavsumo.model.carriageway import Approach
+from cavsumo.model.scenario import plan_from
+from cavsumo.model.snapshot import BodyState, Snapshot
+from cavsumo.network.site import Site
+from cavsumo.sumo.poses import from_sumo
 
 NETWORKS = Path(__file__).parents[1] / "networks"
 STRAIGHT, JUNCTION = NETWORKS / "pedestrians.net.xml", NETWORKS / "junction.net.xml"

@@ -27,14 +27,14 @@ from xml.etree import ElementTree
 
 import libsumo
 
-import cavsumo.simulator as simulator
-from cavsumo.jobs import job
-from cavsumo.network import read_network
-from cavsumo.scenario import plan_from
-from cavsumo.setting import prepare
-from cavsumo.sumo_poses import to_sumo
-from cavsumo.theatre import Theatre
-from cavsumo.world import KEEP_EXACT, MATCH_M, UNSAFE, World
+from cavsumo.batch.episode_runner import Theatre
+from cavsumo.batch.jobs import job
+from cavsumo.batch.prepared import prepare
+from cavsumo.model.scenario import plan_from
+from cavsumo.network.reader import read_network
+from cavsumo.simulation import loop
+from cavsumo.sumo.poses import to_sumo
+from cavsumo.sumo.world import KEEP_EXACT, MATCH_M, UNSAFE, World
 
 ROOT = Path(__file__).resolve().parent.parent
 
@@ -134,7 +134,7 @@ def compare(theatre: Theatre, episodes: int) -> Spent:
     for run in range(episodes):
         one = job(theatre.plan, run)
         agents = theatre._cast(one)
-        recorded = simulator.play(theatre.stage, agents, one.seed, record=True).frames
+        recorded = loop.play(theatre.stage, agents, one.seed, record=True).frames
         tracks = [[to_bare(t) for t in s.testers] for s in recorded]
         spent.present += [len(s.raw_background) for s in recorded]
         del recorded
@@ -157,7 +157,7 @@ def compare(theatre: Theatre, episodes: int) -> Spent:
 
 def our_seconds(theatre: Theatre, agents: list[Any], seed: int) -> tuple[float, float]:
     """How long cavsumo plays an episode, and how long of that it restarts."""
-    restart, ended = simulator._reset, 0.0
+    restart, ended = loop._reset, 0.0
 
     def clocked(*args: Any) -> Any:
         nonlocal ended
@@ -165,11 +165,11 @@ def our_seconds(theatre: Theatre, agents: list[Any], seed: int) -> tuple[float, 
         ended = time.perf_counter()
         return result
 
-    simulator._reset = clocked
+    loop._reset = clocked
     begun = time.perf_counter()
-    simulator.play(theatre.stage, agents, seed)
+    loop.play(theatre.stage, agents, seed)
     whole = time.perf_counter() - begun
-    simulator._reset = restart
+    loop._reset = restart
     return whole, ended - begun
 
 
@@ -243,22 +243,22 @@ def parts(theatre: Theatre, episodes: int) -> list[tuple[str, float]]:
         return timed
 
     world, stage = theatre.stage.world, theatre.stage
-    originals = (simulator._observe, simulator._moved)
+    originals = (loop._observe, loop._moved)
     world.reset = clocked("restart SUMO", world.reset)  # type: ignore[method-assign]
     world._snapshot = clocked("read SUMO", world._snapshot)  # type: ignore[method-assign]
     world._place = clocked("tell SUMO (moveToXY)", world._place)  # type: ignore[method-assign]
     world.step = clocked("step SUMO", world.step)  # type: ignore[method-assign]
-    simulator._observe = clocked("contacts and assertions", simulator._observe)
-    simulator._moved = clocked("kinematics", simulator._moved)
+    loop._observe = clocked("contacts and assertions", loop._observe)
+    loop._moved = clocked("kinematics", loop._moved)
     begun = time.perf_counter()
     for run in range(episodes):
         one = job(theatre.plan, run)
         agents = theatre._cast(one)
         for agent in agents:
             agent.choose_action = clocked("agents", type(agent).choose_action.__get__(agent))  # type: ignore[method-assign]
-        simulator.play(stage, agents, one.seed)
+        loop.play(stage, agents, one.seed)
     total = time.perf_counter() - begun
-    simulator._observe, simulator._moved = originals
+    loop._observe, loop._moved = originals
     spent["step SUMO"] -= spent["read SUMO"] + spent["tell SUMO (moveToXY)"]
     spent["the rest"] = total - sum(spent.values())
     return sorted(((k, v / total) for k, v in spent.items()), key=lambda kv: -kv[1])

@@ -16,11 +16,11 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+from cavsumo.batch.summary import interval, percent
 from cavsumo.report.analysis import Report, analyse
 from cavsumo.report.compare import Comparison
 from cavsumo.report.rates import WILSON, Rates, Share
-from cavsumo.statistics import rate
-from cavsumo.summary import interval, percent
+from cavsumo.results.statistics import rate
 
 HERE = Path(__file__).resolve().parent
 PLACES = ("straight", "crossing", "timegap", "junction")

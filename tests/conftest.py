@@ -15,21 +15,22 @@ from shapely.geometry import LineString, box
 from support import CHROMIUM, LAPTOP, OPTIONS
 
 from cavsumo.agents.base import Scene
-from cavsumo.bodies import PEDESTRIAN, Body, Kind
+from cavsumo.batch.episode_runner import Theatre
+from cavsumo.batch.jobs import job
+from cavsumo.batch.prepared import Setting, prepare
+from cavsumo.batch.replay import Record
 from cavsumo.cli import main
 from cavsumo.egos import make_ego
 from cavsumo.egos.base import EGO_KIND
-from cavsumo.jobs import job
-from cavsumo.paths import Path as Polyline
-from cavsumo.replays import Record
-from cavsumo.roads import Roads, Start
-from cavsumo.scenario import BatchPlan, plan_from
-from cavsumo.setting import Setting, checksums, prepare, versions
-from cavsumo.site import Site
-from cavsumo.snapshot import BodyState, Snapshot
-from cavsumo.theatre import Theatre
-from cavsumo.traces import Trace, parsed
-from cavsumo.world import World
+from cavsumo.model.bodies import PEDESTRIAN, Body, Kind
+from cavsumo.model.carriageway import Roads, Start
+from cavsumo.model.polyline import Path as Polyline
+from cavsumo.model.scenario import BatchPlan, plan_from
+from cavsumo.model.snapshot import BodyState, Snapshot
+from cavsumo.network.site import Site
+from cavsumo.results.provenance import checksums, versions
+from cavsumo.results.traces import Trace, parsed
+from cavsumo.sumo.world import World
 
 ROOT = Path(__file__).parents[1]
 NAMES = ("crossing", "junction", "pedestrians")

@@ -11,15 +11,15 @@ import numpy as np
 
 from cavsumo.agents.base import Agent
 from cavsumo.assertions.base import Judgement
-from cavsumo.bodies import Action, Kind, clamped
 from cavsumo.egos.base import Acceleration, Command, Drive, Ego
-from cavsumo.roads import Start
-from cavsumo.scenario import BatchPlan
-from cavsumo.scene import Scene
-from cavsumo.simulator import Episode, play
-from cavsumo.site import Site
-from cavsumo.snapshot import BodyState, Snapshot
-from cavsumo.stage import set_stage
+from cavsumo.model.bodies import Action, Kind, clamped
+from cavsumo.model.carriageway import Start
+from cavsumo.model.scenario import BatchPlan
+from cavsumo.model.scene import Scene
+from cavsumo.model.snapshot import BodyState, Snapshot
+from cavsumo.network.site import Site
+from cavsumo.simulation.loop import Episode, play
+from cavsumo.simulation.setup import set_stage
 
 Speed = Callable[[Snapshot], float | Drive]  # the speed that the ego wants [m/s], or how it steers
 Act = Callable[[Snapshot, BodyState], tuple[float, float]]  # a body's speed [m/s] and steering

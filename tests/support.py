@@ -10,8 +10,8 @@ from concurrent.futures import Executor, Future
 from pathlib import Path
 from typing import Any
 
-from cavsumo.results import read_rows
-from cavsumo.setting import Setting
+from cavsumo.batch.prepared import Setting
+from cavsumo.results.reading import read_rows
 
 PATIENCE_S = 60.0
 CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser")
@@ -69,7 +69,7 @@ def workers_of(parent: int) -> dict[int, str]:
             fields = (folder / "stat").read_text().rpartition(")")[2].split()
         except OSError:  # gone meanwhile
             continue
-        if int(fields[1]) == parent and b"cavsumo.worker_process" in command:
+        if int(fields[1]) == parent and b"cavsumo.batch.worker_process" in command:
             found[int(folder.name)] = fields[19]
     return found
 

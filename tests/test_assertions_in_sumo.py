@@ -14,10 +14,10 @@ from staging import Stage
 
 from cavsumo.assertions import ASSERTIONS
 from cavsumo.egos.base import Drive
-from cavsumo.roads import Start
-from cavsumo.scenario import BatchPlan
-from cavsumo.site import Site
-from cavsumo.snapshot import BodyState, Snapshot
+from cavsumo.model.carriageway import Start
+from cavsumo.model.scenario import BatchPlan
+from cavsumo.model.snapshot import BodyState, Snapshot
+from cavsumo.network.site import Site
 
 Staged = Callable[..., tuple[BatchPlan, Site]]
 LEFT = math.pi / 2  # across the ego's way

@@ -14,23 +14,23 @@ import pytest
 from support import rows
 
 from cavsumo.agents.base import Agent
-from cavsumo.bodies import Action
+from cavsumo.batch.episode_runner import Theatre
+from cavsumo.batch.executors import Means
+from cavsumo.batch.jobs import job
 from cavsumo.cli import main
-from cavsumo.commands.run import Manner, run
-from cavsumo.counterfactual import NOT_MONOTONE, Retrial, Verdict, Watch
+from cavsumo.cli.commands.run import Manner, run
 from cavsumo.egos import make_ego
 from cavsumo.egos.base import Ego
-from cavsumo.egos.takeover import Takeover
-from cavsumo.executors import Means
-from cavsumo.jobs import job
-from cavsumo.references import REFERENCES
+from cavsumo.egos.reference import REFERENCES
+from cavsumo.egos.reference.takeover import Takeover
+from cavsumo.model.bodies import Action
+from cavsumo.model.carriageway import Start
+from cavsumo.model.scenario import BatchPlan
+from cavsumo.network.site import Site
 from cavsumo.report.analysis import analyse
-from cavsumo.roads import Start
-from cavsumo.scenario import BatchPlan
-from cavsumo.simulator import Performance, play
-from cavsumo.site import Site
-from cavsumo.stage import Stage, set_stage
-from cavsumo.theatre import Theatre
+from cavsumo.simulation.avoidability import NOT_MONOTONE, Retrial, Verdict, Watch
+from cavsumo.simulation.loop import Performance, play
+from cavsumo.simulation.setup import Stage, set_stage
 
 LANE_Y, SPEED, WALK, DT = -1.825, 8.0, 1.4, 0.1
 HALF = 0.328125  # half the length of a pedestrian, half its width is 0.4375 [m]

@@ -13,17 +13,17 @@ import libsumo
 import pytest
 
 from cavsumo.agents.programmed import TimingAgent
-from cavsumo.background import Background, Roaming, roaming
-from cavsumo.bodies import PEDESTRIAN, Body
+from cavsumo.batch.episode_runner import Theatre
+from cavsumo.batch.jobs import job
 from cavsumo.egos.base import EGO_KIND
 from cavsumo.errors import SimulationError
-from cavsumo.geometry import gap
-from cavsumo.jobs import job
-from cavsumo.scenario import BatchPlan
-from cavsumo.simulator import Episode, play
-from cavsumo.site import Site
-from cavsumo.snapshot import BodyState, RawState, Snapshot
-from cavsumo.theatre import Theatre
+from cavsumo.model.bodies import PEDESTRIAN, Body
+from cavsumo.model.geometry import gap
+from cavsumo.model.scenario import BatchPlan
+from cavsumo.model.snapshot import BodyState, RawState, Snapshot
+from cavsumo.network.site import Site
+from cavsumo.simulation.loop import Episode, play
+from cavsumo.sumo.background import Background, Roaming, roaming
 
 Staged = Callable[..., tuple[BatchPlan, Site]]
 DT, TOP = 0.1, 20.0  # s, m/s

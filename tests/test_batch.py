@@ -9,13 +9,14 @@ from typing import Any
 
 import pytest
 
-from cavsumo.batch import run_batch
+from cavsumo.batch.dispatch import run_batch
+from cavsumo.batch.executors import local_executor
+from cavsumo.batch.jobs import job
+from cavsumo.batch.prepared import Setting
+from cavsumo.batch.worker import Answer, Worker
 from cavsumo.errors import InputError
-from cavsumo.executors import local_executor
-from cavsumo.jobs import episode_seed, job
-from cavsumo.outcomes import Outcome
-from cavsumo.setting import Setting
-from cavsumo.worker import Answer, Worker
+from cavsumo.model.seeds import episode_seed
+from cavsumo.results.rows import Outcome
 
 SetUp = Callable[..., Setting]
 Row = dict[str, Any]

@@ -11,12 +11,12 @@ import pytest
 from shapely.geometry import Point
 from staging import Stage
 
-from cavsumo.blame import RULES
-from cavsumo.roads import Approach, Start
-from cavsumo.scenario import BatchPlan
-from cavsumo.site import Site
-from cavsumo.snapshot import BodyState, Snapshot
-from cavsumo.theatre import measured
+from cavsumo.assertions.blame import RULES
+from cavsumo.batch.episode_runner import measured
+from cavsumo.model.carriageway import Approach, Start
+from cavsumo.model.scenario import BatchPlan
+from cavsumo.model.snapshot import BodyState, Snapshot
+from cavsumo.network.site import Site
 
 Staged = Callable[..., tuple[BatchPlan, Site]]
 LEFT = math.pi / 2  # across the ego's way

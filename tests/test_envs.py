@@ -20,24 +20,24 @@ from gymnasium.vector import AsyncVectorEnv
 from support import SHORT, STRAIGHT_NET
 
 from cavsumo.agents import AGENTS
-from cavsumo.bodies import CAR, PEDESTRIAN
-from cavsumo.ego_observations import entries as ego_entries
-from cavsumo.ego_rewards import HARSH_COST, OFF_ROAD, PROGRESS, TIME_COST, VIOLATION
+from cavsumo.agents.observations import entries
+from cavsumo.batch.episode_runner import Theatre
+from cavsumo.batch.jobs import Job
 from cavsumo.egos import make_ego
 from cavsumo.egos.base import Acceleration, Command
 from cavsumo.envs import parallel_env, tester
 from cavsumo.envs.discrete import DiscreteActions
 from cavsumo.envs.ego import EgoEnv
+from cavsumo.envs.ego_observations import entries as ego_entries
+from cavsumo.envs.ego_rewards import HARSH_COST, OFF_ROAD, PROGRESS, TIME_COST, VIOLATION
 from cavsumo.errors import AgentError, InputError, SimulationError, SimulationTaken
-from cavsumo.jobs import Job
-from cavsumo.observations import entries
-from cavsumo.outcomes import cell
-from cavsumo.rewards import GOAL, ROAD_COST
-from cavsumo.simulator import Performance
-from cavsumo.snapshot import Snapshot
-from cavsumo.stage import set_stage
-from cavsumo.theatre import Theatre
-from cavsumo.world import World
+from cavsumo.model.bodies import CAR, PEDESTRIAN
+from cavsumo.model.snapshot import Snapshot
+from cavsumo.results.rows import cell
+from cavsumo.simulation.loop import Performance
+from cavsumo.simulation.rewards import GOAL, ROAD_COST
+from cavsumo.simulation.setup import set_stage
+from cavsumo.sumo.world import World
 
 NEAR = {"range_m": 3.0}
 IDS = ("cavsumo/Tester-v0", "cavsumo/Ego-v0")

@@ -18,15 +18,15 @@ from typing import Any
 import pytest
 from support import PATIENCE_S, rows, until
 
-from cavsumo.batch import run_batch
+from cavsumo.batch.dispatch import run_batch
+from cavsumo.batch.executors import Means, local_executor, opened
+from cavsumo.batch.prepared import Setting, prepare
+from cavsumo.batch.worker import close_all
 from cavsumo.cli import main
 from cavsumo.errors import BatchError
-from cavsumo.executors import Means, local_executor, opened
-from cavsumo.outcomes import Outcome
-from cavsumo.results import read_manifest
-from cavsumo.scenario import plan_from
-from cavsumo.setting import Setting, prepare
-from cavsumo.worker import close_all
+from cavsumo.model.scenario import plan_from
+from cavsumo.results.reading import read_manifest
+from cavsumo.results.rows import Outcome
 
 RUNS = 6
 WORDS = f"-r none --agent timing --agent q-learning --testers 2 --end 8 --runs {RUNS} -q".split()
@@ -271,7 +271,7 @@ def test_a_scheduler_that_is_not_there_is_one_sentence(
 ) -> None:
     """Exit 2 after a while, and nothing is written."""
     pytest.importorskip("distributed")
-    monkeypatch.setattr("cavsumo.executors.CONNECT_S", 2.0)
+    monkeypatch.setattr("cavsumo.batch.executors.CONNECT_S", 2.0)
     there = address.replace("PORT", str(free_port()))
     said = refused("--executor", "dask", "--scheduler", there)
     assert f"scheduler {there!r}: cannot be reached" in said

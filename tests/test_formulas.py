@@ -16,10 +16,8 @@ import numpy as np
 import pytest
 
 from cavsumo.assertions.formula import FormulaAssertion
-from cavsumo.bodies import CAR, PEDESTRIAN, Body
-from cavsumo.errors import AssertionFault, InputError, UnknownName
-from cavsumo.formulas import SIGNALS, Moment, View, robustness, rule
-from cavsumo.formulas.nodes import (
+from cavsumo.assertions.formulas import SIGNALS, Moment, View, robustness, rule
+from cavsumo.assertions.formulas.nodes import (
     Comparison,
     Conditional,
     Constant,
@@ -32,13 +30,15 @@ from cavsumo.formulas.nodes import (
     TruthNode,
     Until,
 )
-from cavsumo.formulas.semantics import TINY, Bounds
-from cavsumo.formulas.windows import largest_ahead
-from cavsumo.metrics import drac_boxes, ttc_boxes
-from cavsumo.paths import Path as Polyline
-from cavsumo.roads import Light, Start
-from cavsumo.scene import Scene
-from cavsumo.snapshot import BodyState, Snapshot
+from cavsumo.assertions.formulas.semantics import TINY, Bounds
+from cavsumo.assertions.formulas.windows import largest_ahead
+from cavsumo.assertions.metrics import drac_boxes, ttc_boxes
+from cavsumo.errors import AssertionFault, InputError, UnknownName
+from cavsumo.model.bodies import CAR, PEDESTRIAN, Body
+from cavsumo.model.carriageway import Light, Start
+from cavsumo.model.polyline import Path as Polyline
+from cavsumo.model.scene import Scene
+from cavsumo.model.snapshot import BodyState, Snapshot
 
 VECTORS = Path(__file__).parent / "data" / "formula_vectors.json"
 CASES = json.loads(VECTORS.read_text(encoding="utf-8"))["cases"]

@@ -10,13 +10,13 @@ from typing import Any
 import pytest
 from support import Troupe, content, rows, traces
 
+from cavsumo.batch.batch_run import Session
+from cavsumo.batch.executors import local_executor
+from cavsumo.batch.prepared import manifest, prepare
 from cavsumo.cli import main
-from cavsumo.executors import local_executor
-from cavsumo.recorder import Recorder
-from cavsumo.results import read_manifest
-from cavsumo.scenario import plan_from
-from cavsumo.session import Session
-from cavsumo.setting import manifest, prepare
+from cavsumo.model.scenario import plan_from
+from cavsumo.results.reading import read_manifest
+from cavsumo.results.writing import Recorder
 
 RUNS = 5
 SHARDS = {"whole": None, "a": "1/2", "b": "2/2", "c1": "1/3", "c2": "2/3", "c3": "3/3"}

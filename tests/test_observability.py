@@ -10,18 +10,20 @@ import pytest
 from support import rows, traces
 
 from cavsumo.agents import AGENTS, Agent
+from cavsumo.agents.casting import make_agents
+from cavsumo.batch.episode_runner import Theatre
+from cavsumo.batch.jobs import job
 from cavsumo.cli import main
-from cavsumo.config import read_config
 from cavsumo.errors import InputError, UnknownName
-from cavsumo.jobs import episode_seed, job, make_agents
-from cavsumo.scenario import BatchPlan, plan_from
-from cavsumo.sensors import Sensor
-from cavsumo.simulator import Performance, play
-from cavsumo.site import Site
-from cavsumo.snapshot import Snapshot
-from cavsumo.stage import set_stage
-from cavsumo.theatre import Theatre
-from cavsumo.traces import frame
+from cavsumo.model.scenario import BatchPlan, plan_from
+from cavsumo.model.scenario_file import read_config
+from cavsumo.model.seeds import episode_seed
+from cavsumo.model.sensors import Sensor
+from cavsumo.model.snapshot import Snapshot
+from cavsumo.network.site import Site
+from cavsumo.results.traces import frame
+from cavsumo.simulation.loop import Performance, play
+from cavsumo.simulation.setup import set_stage
 
 Staged = Callable[..., tuple[BatchPlan, Site]]
 Writer = Callable[..., str]

@@ -11,14 +11,14 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from cavsumo.agents import AGENTS, Scene
-from cavsumo.bodies import PEDESTRIAN
+from cavsumo.agents.observations import Observer, entries
 from cavsumo.egos.base import EGO_KIND
-from cavsumo.observations import Observer, entries
-from cavsumo.scenario import BatchPlan
-from cavsumo.simulator import Performance
-from cavsumo.site import Site
-from cavsumo.snapshot import Snapshot
-from cavsumo.stage import set_stage
+from cavsumo.model.bodies import PEDESTRIAN
+from cavsumo.model.scenario import BatchPlan
+from cavsumo.model.snapshot import Snapshot
+from cavsumo.network.site import Site
+from cavsumo.simulation.loop import Performance
+from cavsumo.simulation.setup import set_stage
 
 Snapshots = Callable[..., Snapshot]
 HALF_EGO, HALF_STRIP = EGO_KIND.length / 2, EGO_KIND.width / 2

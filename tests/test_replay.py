@@ -13,16 +13,17 @@ from typing import Any
 
 import pytest
 
-from cavsumo.checked import Manner
+from cavsumo.batch.executors import Means
+from cavsumo.batch.preflight import Manner
+from cavsumo.batch.prepared import prepare
+from cavsumo.batch.replay import Record, compare, located, recorded, recorded_alone, replayed
+from cavsumo.batch.worker import Worker
 from cavsumo.cli import main
-from cavsumo.commands.replay import Wanted, replay
-from cavsumo.commands.run import run
+from cavsumo.cli.commands.replay import Wanted, replay
+from cavsumo.cli.commands.run import run
 from cavsumo.errors import DivergenceError, Exit, InputError, ResultsError
-from cavsumo.executors import Means
-from cavsumo.outcomes import COLUMNS, Outcome
-from cavsumo.replays import Record, compare, located, recorded, recorded_alone, replayed
-from cavsumo.setting import prepare
-from cavsumo.worker import Worker
+from cavsumo.results.columns import COLUMNS
+from cavsumo.results.rows import Outcome
 
 Frames = list[dict[str, Any]]
 RUN = 1  # the episode that is played again

@@ -15,15 +15,15 @@ from typing import Any
 import pytest
 from support import PATIENCE_S, alive, content, rows, traces, until, workers_of
 
-from cavsumo import learning
+from cavsumo.batch import learning
+from cavsumo.batch.batch_run import Session
+from cavsumo.batch.executors import local_executor
+from cavsumo.batch.prepared import Setting, manifest, prepare
 from cavsumo.cli import main
 from cavsumo.errors import BatchError
-from cavsumo.executors import local_executor
-from cavsumo.recorder import Recorder
-from cavsumo.results import read_manifest
-from cavsumo.scenario import plan_from
-from cavsumo.session import Session
-from cavsumo.setting import Setting, manifest, prepare
+from cavsumo.model.scenario import plan_from
+from cavsumo.results.reading import read_manifest
+from cavsumo.results.writing import Recorder
 
 RUNS = 9
 DOOMED = (1, 3)  # episodes whose starts can be made fatal

@@ -14,16 +14,16 @@ import numpy as np
 import pytest
 from support import Troupe, rows
 
+from cavsumo.batch.batch_run import Session
+from cavsumo.batch.executors import local_executor
+from cavsumo.batch.prepared import manifest, prepare
+from cavsumo.batch.stopping import looks_at_rows
 from cavsumo.cli import main
 from cavsumo.errors import InputError
-from cavsumo.executors import local_executor
-from cavsumo.recorder import Recorder
-from cavsumo.results import read_manifest
-from cavsumo.scenario import plan_from
-from cavsumo.session import Session
-from cavsumo.setting import manifest, prepare
-from cavsumo.statistics import rate, sequential_rate
-from cavsumo.stopping import looks_at_rows
+from cavsumo.model.scenario import plan_from
+from cavsumo.results.reading import read_manifest
+from cavsumo.results.statistics import rate, sequential_rate
+from cavsumo.results.writing import Recorder
 
 RUNS = 12
 AGENTS = ["timing", "election"]

@@ -13,14 +13,14 @@ from pathlib import Path
 import pytest
 from support import PATIENCE_S, content, rows, until
 
+from cavsumo.batch.prepared import prepare
+from cavsumo.batch.summary import interval
 from cavsumo.cli import main
 from cavsumo.errors import InputError
-from cavsumo.results import read_manifest
-from cavsumo.scenario import plan_from
-from cavsumo.setting import prepare
-from cavsumo.statistics import rate
-from cavsumo.study import Choice, Part, overruled, product, read_study
-from cavsumo.summary import interval
+from cavsumo.model.scenario import plan_from
+from cavsumo.model.study import Choice, Part, overruled, product, read_study
+from cavsumo.results.reading import read_manifest
+from cavsumo.results.statistics import rate
 
 ROOT = Path(__file__).parents[1]
 Write = Callable[[str], Path]

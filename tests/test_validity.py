@@ -12,22 +12,22 @@ from shapely.geometry import LineString, box
 from staging import Stage
 
 from cavsumo.assertions.base import Judgement
-from cavsumo.bodies import CAR, PEDESTRIAN, Body, Kind
-from cavsumo.conduct import Conduct
-from cavsumo.contacts import ContactMonitor, depth
-from cavsumo.geometry import Box
-from cavsumo.kinematics import step_floats
-from cavsumo.paths import Path
+from cavsumo.assertions.contacts import ContactMonitor, depth
+from cavsumo.assertions.naturalness import Conduct
+from cavsumo.assertions.validity import STRAY_M, Breach, Umpire, possible
+from cavsumo.batch.episode_runner import measured
+from cavsumo.batch.tally import Tally
+from cavsumo.model.bodies import CAR, PEDESTRIAN, Body, Kind
+from cavsumo.model.carriageway import Roads, Start
+from cavsumo.model.geometry import Box
+from cavsumo.model.kinematics import step_floats
+from cavsumo.model.polyline import Path
+from cavsumo.model.scenario import BatchPlan
+from cavsumo.model.scene import Scene
+from cavsumo.model.snapshot import BodyState, Snapshot
+from cavsumo.network.site import Site
 from cavsumo.report.rates import rates
-from cavsumo.rewards import GOAL, Ledger
-from cavsumo.roads import Roads, Start
-from cavsumo.scenario import BatchPlan
-from cavsumo.scene import Scene
-from cavsumo.site import Site
-from cavsumo.snapshot import BodyState, Snapshot
-from cavsumo.tally import Tally
-from cavsumo.theatre import measured
-from cavsumo.validity import STRAY_M, Breach, Umpire, possible
+from cavsumo.simulation.rewards import GOAL, Ledger
 
 DT = 0.1
 LEFT = math.pi / 2  # across the ego's way

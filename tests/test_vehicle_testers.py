@@ -8,12 +8,12 @@ from typing import Any
 
 import pytest
 
+from cavsumo.batch.jobs import job
+from cavsumo.batch.prepared import prepare
+from cavsumo.batch.worker import Worker
 from cavsumo.errors import InputError
-from cavsumo.jobs import job
-from cavsumo.outcomes import Outcome
-from cavsumo.scenario import plan_from
-from cavsumo.setting import prepare
-from cavsumo.worker import Worker
+from cavsumo.model.scenario import plan_from
+from cavsumo.results.rows import Outcome
 
 SetUp = Callable[..., Any]
 PROGRAMMED = ["timing", "proximity", "programmed-random", "election"]

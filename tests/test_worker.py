@@ -16,14 +16,14 @@ from typing import Any
 import pytest
 from support import PATIENCE_S, alive, until, workers_of
 
-from cavsumo import worker_process
+from cavsumo.batch import worker_process
+from cavsumo.batch.jobs import job
+from cavsumo.batch.prepared import Setting, prepare
+from cavsumo.batch.worker import Worker
+from cavsumo.batch.worker_process import GOODBYE
 from cavsumo.errors import BatchError, InputError
-from cavsumo.jobs import job
-from cavsumo.outcomes import Outcome
-from cavsumo.scenario import plan_from
-from cavsumo.setting import Setting, prepare
-from cavsumo.worker import Worker
-from cavsumo.worker_process import GOODBYE
+from cavsumo.model.scenario import plan_from
+from cavsumo.results.rows import Outcome
 
 # An ego with a child of its own, whose number it leaves in a file; it waits while ``wait`` exists.
 PARENT = """
@@ -342,7 +342,7 @@ IMPATIENT = """
 import sys
 from pathlib import Path
 
-name = "cavsumo.worker_process"
+name = "cavsumo.batch.worker_process"
 if name in sys.orig_argv:
     import cavsumo
     source = (Path(cavsumo.__file__).parent / "worker_process.py").read_text()

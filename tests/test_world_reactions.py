@@ -10,17 +10,17 @@ from typing import Any
 import libsumo
 import pytest
 
-from cavsumo.bodies import BICYCLE, BUS, CAR, PEDESTRIAN, Body, Kind
+from cavsumo.batch.jobs import job
+from cavsumo.batch.worker import Worker
 from cavsumo.egos import Acceleration, Drive
 from cavsumo.errors import SimulationError
-from cavsumo.jobs import job
-from cavsumo.kinematics import step_floats
-from cavsumo.roads import Start
-from cavsumo.snapshot import BodyState, Snapshot
-from cavsumo.starts import StartingArea
-from cavsumo.sumo_poses import to_sumo
-from cavsumo.worker import Worker
-from cavsumo.world import World
+from cavsumo.model.bodies import BICYCLE, BUS, CAR, PEDESTRIAN, Body, Kind
+from cavsumo.model.carriageway import Start
+from cavsumo.model.kinematics import step_floats
+from cavsumo.model.snapshot import BodyState, Snapshot
+from cavsumo.network.pedestrian_starts import StartingArea
+from cavsumo.sumo.poses import to_sumo
+from cavsumo.sumo.world import World
 
 Opener = Callable[..., World]
 LANE_Y = -1.825  # of the ego's lane on the straight road [m]

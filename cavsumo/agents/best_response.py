@@ -17,9 +17,10 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from cavsumo.abstraction.coordinates import Coordinates, Relative
-from cavsumo.abstraction.opponent import Counts, Watch, acceleration_class, situation
-from cavsumo.abstraction.response import (
+from cavsumo.agents.base import AGENTS, Agent, learner_of
+from cavsumo.agents.planning.coordinates import Coordinates, Relative
+from cavsumo.agents.planning.opponent import Counts, Watch, acceleration_class, situation
+from cavsumo.agents.planning.response import (
     STAND,
     WALK,
     ZETAS,
@@ -30,14 +31,13 @@ from cavsumo.abstraction.response import (
     braking,
     scale,
 )
-from cavsumo.agents.base import AGENTS, Agent, learner_of
 from cavsumo.agents.triggers import Timing, time_to_walk
 from cavsumo.agents.walking import ApproachKerb, CrossingWalk, walk
-from cavsumo.bodies import NOOP, Action, Kind
-from cavsumo.checks import choice, number, truth
-from cavsumo.kinematics import wrap
-from cavsumo.scene import Scene
-from cavsumo.snapshot import BodyState, Snapshot
+from cavsumo.model.bodies import NOOP, Action, Kind
+from cavsumo.model.checks import choice, number, truth
+from cavsumo.model.kinematics import wrap
+from cavsumo.model.scene import Scene
+from cavsumo.model.snapshot import BodyState, Snapshot
 
 MODEL_DT = 0.1  # timestep of the model, unless those of the scenario are longer [s]
 AIMS = ("violation", "test")
@@ -52,7 +52,7 @@ KNOWN = "best-response"
 @lru_cache(maxsize=8)
 def _planned(counts: str, dt: float, aim: Aim) -> Plan:
     """The plan for counts as text; agents of one process share it."""
-    from cavsumo.abstraction.solving import best_response
+    from cavsumo.agents.planning.solving import best_response
 
     return best_response(Counts.of(json.loads(counts)), dt, aim)
 

@@ -11,19 +11,19 @@ from typing import ClassVar
 
 import numpy as np
 
-from cavsumo.abstraction.classes import EGO_CLASSES
-from cavsumo.abstraction.coordinates import Coordinates
-from cavsumo.abstraction.outlook import Constant, Free, Outlook, Unaware
-from cavsumo.abstraction.rules import Rules, against_any, against_constant
-from cavsumo.abstraction.solved import solved
 from cavsumo.agents.base import AGENTS, NOT_FORCEABLE, SURE, UNDECIDED, Agent, Forecast
-from cavsumo.agents.rehearsal import succeeds
-from cavsumo.agents.tactics import Tactic
+from cavsumo.agents.body_policy import Tactic
+from cavsumo.agents.lookahead import succeeds
+from cavsumo.agents.planning.classes import EGO_CLASSES
+from cavsumo.agents.planning.coordinates import Coordinates
+from cavsumo.agents.planning.forceability import Constant, Free, Outlook, Unaware
+from cavsumo.agents.planning.rules import Rules, against_any, against_constant
+from cavsumo.agents.planning.solved import solved
 from cavsumo.agents.triggers import MAX_DECEL, REACTION_TIME
-from cavsumo.bodies import PEDESTRIAN, Action, Kind
-from cavsumo.checks import choice, number
-from cavsumo.scene import Scene
-from cavsumo.snapshot import Snapshot
+from cavsumo.model.bodies import PEDESTRIAN, Action, Kind
+from cavsumo.model.checks import choice, number
+from cavsumo.model.scene import Scene
+from cavsumo.model.snapshot import Snapshot
 
 NEAR_M, FAR_M = 3.0, 6.0  # how far from the strip the tables begin: of free and of constant egos
 # Ways that are tried at once where the straight one takes too long, off the way across [rad].

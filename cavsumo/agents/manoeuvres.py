@@ -13,11 +13,11 @@ from typing import ClassVar
 
 from cavsumo.agents.driving import HASTE_MPS2, RUN_OUT_M, Course, stopping_from
 from cavsumo.agents.triggers import MARGIN, MAX_DECEL, REACTION_TIME, Trigger
-from cavsumo.bodies import NOOP, Action
-from cavsumo.fairness import drift
-from cavsumo.roads import Approach
-from cavsumo.scene import Scene
-from cavsumo.snapshot import BodyState, Snapshot
+from cavsumo.model.bodies import NOOP, Action
+from cavsumo.model.carriageway import Approach
+from cavsumo.model.scene import Scene
+from cavsumo.model.snapshot import BodyState, Snapshot
+from cavsumo.model.zone_presence import drift
 
 MANOEUVRES = ("auto", "run", "brake", "cut-in")
 CREEPING_MPS = 2.0  # a lawful vehicle goes no slower than this to where it waits

@@ -13,13 +13,13 @@ import numpy as np
 
 from cavsumo.agents.base import AGENTS, Agent
 from cavsumo.agents.features import across, towards
-from cavsumo.bodies import WALKING, Action, Kind
+from cavsumo.agents.observations import Observer
+from cavsumo.agents.policy_file import Policy, read_policy
 from cavsumo.errors import InputError, UnknownName
-from cavsumo.observations import Observer
-from cavsumo.policies import Policy, read_policy
-from cavsumo.registry import Parameter
-from cavsumo.scene import Scene
-from cavsumo.snapshot import Snapshot
+from cavsumo.model.bodies import WALKING, Action, Kind
+from cavsumo.model.registry import Parameter
+from cavsumo.model.scene import Scene
+from cavsumo.model.snapshot import Snapshot
 
 PREFIX = "policy:"
 

@@ -28,14 +28,15 @@ from cavsumo.assertions.base import (
     Assertion,
     Judgement,
 )
-from cavsumo.assertions.room import Room, impact
-from cavsumo.bodies import WALKING
-from cavsumo.checks import number
-from cavsumo.contacts import STANDING_MPS, Contact
-from cavsumo.fairness import counted, drives_clear, is_vehicle, out_of_the_way, ran_into
-from cavsumo.geometry import TOUCH, Box, in_frame, overlap, zone_entered
-from cavsumo.scene import Scene
-from cavsumo.snapshot import BodyState, Snapshot
+from cavsumo.assertions.clearance import Room, impact
+from cavsumo.assertions.contacts import STANDING_MPS, Contact
+from cavsumo.model.bodies import WALKING
+from cavsumo.model.checks import number
+from cavsumo.model.geometry import TOUCH, Box, in_frame, overlap
+from cavsumo.model.scene import Scene
+from cavsumo.model.snapshot import BodyState, Snapshot
+from cavsumo.model.stopping_zones import zone_entered
+from cavsumo.model.zone_presence import counted, drives_clear, is_vehicle, out_of_the_way, ran_into
 
 BESIDE_M = 0.2  # a body this far beside the strip ahead has left the ego's way
 

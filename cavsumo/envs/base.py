@@ -10,13 +10,13 @@ from gymnasium import spaces
 from gymnasium.error import ResetNeeded
 from numpy.typing import NDArray
 
-from cavsumo.checks import choice
+from cavsumo.batch.prepared import Setting
 from cavsumo.envs.elsewhere import Elsewhere
 from cavsumo.envs.episodes import Episodes, Seen
 from cavsumo.envs.settings import PROCESSES, Roles
 from cavsumo.envs.spaces import ActionSpace, Vector, numbers
 from cavsumo.errors import InputError
-from cavsumo.setting import Setting
+from cavsumo.model.checks import choice
 
 RENDER_MODES = ("rgb_array",)
 

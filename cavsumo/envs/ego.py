@@ -5,8 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-from cavsumo.ego_observations import entries
 from cavsumo.envs.base import OneLearner
+from cavsumo.envs.ego_observations import entries
 from cavsumo.envs.episodes import EGO
 from cavsumo.envs.puppets import PuppetEgo
 from cavsumo.envs.settings import Roles, setting_for

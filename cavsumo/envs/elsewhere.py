@@ -15,12 +15,12 @@ from multiprocessing import Pipe
 from multiprocessing.connection import Connection
 from typing import Any
 
+from cavsumo.batch.prepared import Setting
 from cavsumo.envs.episodes import Seen
 from cavsumo.envs.settings import Roles
 from cavsumo.errors import CavsumoError, SimulationError
-from cavsumo.processes import inner_environment
-from cavsumo.setting import Setting
-from cavsumo.snapshot import Snapshot
+from cavsumo.model.processes import inner_environment
+from cavsumo.model.snapshot import Snapshot
 
 
 class Elsewhere:

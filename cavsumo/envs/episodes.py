@@ -10,20 +10,20 @@ import weakref
 from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
-from cavsumo.bodies import Body
-from cavsumo.ego_observations import EgoObserver
-from cavsumo.ego_rewards import EgoLedger
+from cavsumo.agents.casting import make_agents
+from cavsumo.agents.observations import Observer
+from cavsumo.batch.prepared import Setting
+from cavsumo.envs.ego_observations import EgoObserver
+from cavsumo.envs.ego_rewards import EgoLedger
 from cavsumo.envs.events import Watch
 from cavsumo.envs.puppets import PuppetAgent, PuppetEgo
 from cavsumo.envs.settings import Roles
 from cavsumo.envs.spaces import Vector
 from cavsumo.errors import SimulationError, SimulationTaken
-from cavsumo.jobs import make_agents
-from cavsumo.observations import Observer
-from cavsumo.setting import Setting
-from cavsumo.simulator import Performance
-from cavsumo.snapshot import Snapshot
-from cavsumo.stage import Stage, set_stage
+from cavsumo.model.bodies import Body
+from cavsumo.model.snapshot import Snapshot
+from cavsumo.simulation.loop import Performance
+from cavsumo.simulation.setup import Stage, set_stage
 
 EGO = "ego"
 

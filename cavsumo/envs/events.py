@@ -6,8 +6,8 @@ from collections.abc import Sequence
 from typing import Any
 
 from cavsumo.assertions.base import NOT_TRIGGERED, UNFAIR, VIOLATED, Assertion
-from cavsumo.simulator import Performance
-from cavsumo.theatre import measured
+from cavsumo.batch.episode_runner import measured
+from cavsumo.simulation.loop import Performance
 
 # The keys of ``info`` with their meaning.
 KEYS = {

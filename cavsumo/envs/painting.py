@@ -14,11 +14,12 @@ import shapely
 from numpy.typing import NDArray
 
 from cavsumo.agents.triggers import MAX_DECEL, REACTION_TIME
-from cavsumo.bodies import WALKING
+from cavsumo.batch.prepared import Setting
 from cavsumo.errors import InputError
-from cavsumo.geometry import Box, corners, zone_polygons
-from cavsumo.setting import Setting
-from cavsumo.snapshot import BodyState, Snapshot
+from cavsumo.model.bodies import WALKING
+from cavsumo.model.geometry import Box, corners
+from cavsumo.model.snapshot import BodyState, Snapshot
+from cavsumo.model.stopping_zones import zone_polygons
 
 try:
     from PIL import Image, ImageDraw, ImageFont

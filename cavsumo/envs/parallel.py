@@ -12,7 +12,9 @@ from gymnasium.error import ResetNeeded
 from gymnasium.utils import seeding
 from numpy.typing import NDArray
 
-from cavsumo import ego_observations, observations
+from cavsumo.agents import observations
+from cavsumo.agents.casting import teams, tester_bodies
+from cavsumo.envs import ego_observations
 from cavsumo.envs.base import RENDER_MODES, Play, check_render_mode
 from cavsumo.envs.episodes import EGO, Seen, team_name
 from cavsumo.envs.puppets import PuppetEgo
@@ -26,7 +28,6 @@ from cavsumo.envs.spaces import (
     team_space,
 )
 from cavsumo.errors import AgentError, InputError
-from cavsumo.jobs import teams, tester_bodies
 
 try:
     from pettingzoo import ParallelEnv

@@ -7,16 +7,16 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from cavsumo.bodies import WALKING
-from cavsumo.checks import choice, whole
-from cavsumo.config import read_config
+from cavsumo.agents.casting import learners
+from cavsumo.batch.prepared import Setting, prepare
 from cavsumo.egos import make_ego
 from cavsumo.egos.base import Ego
 from cavsumo.envs.puppets import ACTIONS, PuppetEgo
 from cavsumo.errors import InputError, UnknownName
-from cavsumo.jobs import learners
-from cavsumo.scenario import SCENARIO_KEYS, plan_from
-from cavsumo.setting import Setting, prepare
+from cavsumo.model.bodies import WALKING
+from cavsumo.model.checks import choice, whole
+from cavsumo.model.scenario import SCENARIO_KEYS, plan_from
+from cavsumo.model.scenario_file import read_config
 
 UNTIL = ("game", "verdict")
 PROCESSES = ("this", "own")

@@ -5,12 +5,12 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
+from cavsumo.agents.casting import teams, tester_bodies
+from cavsumo.agents.observations import entries
 from cavsumo.envs.base import OneLearner
 from cavsumo.envs.episodes import team_name
 from cavsumo.envs.settings import Roles, setting_for
 from cavsumo.envs.spaces import observation_space, team_space
-from cavsumo.jobs import teams, tester_bodies
-from cavsumo.observations import entries
 
 
 class TesterEnv(OneLearner):

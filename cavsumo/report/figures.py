@@ -12,7 +12,7 @@ from cavsumo.report.compare import Comparison
 from cavsumo.report.effort import PerSecond
 from cavsumo.report.load import Batch
 from cavsumo.report.rates import Share
-from cavsumo.statistics import Rate
+from cavsumo.results.statistics import Rate
 
 FORMAT = "cavsumo-report-1"
 COLUMNS = ("section", "setting", "agent", "group", "quantity", "value", "low", "high", "method")

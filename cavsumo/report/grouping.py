@@ -11,7 +11,7 @@ import pandas
 
 from cavsumo.errors import InputError
 from cavsumo.report.load import Batch, Evidence
-from cavsumo.setting import EXTENT, differences
+from cavsumo.results.provenance import EXTENT, differences
 
 MOST = 200  # groups; more is no report
 # Settings in which batches may differ and still be told together.

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 
+from cavsumo.batch.summary import interval, percent
 from cavsumo.report.analysis import Report
 from cavsumo.report.cells import Labels, Table, number, p_value, span
 from cavsumo.report.compare import EVENTS, Comparison
@@ -12,7 +13,6 @@ from cavsumo.report.effort import Effort, PerSecond
 from cavsumo.report.load import Batch
 from cavsumo.report.rates import EXACT, SEQUENTIAL, WILSON, Rates, Share
 from cavsumo.report.survival import TimeToTest
-from cavsumo.summary import interval, percent
 
 SHOWN = 10  # cells of failures
 

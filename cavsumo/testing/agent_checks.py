@@ -10,10 +10,10 @@ from collections.abc import Callable, Mapping, Sequence
 import numpy as np
 
 from cavsumo.agents.base import Agent
-from cavsumo.bodies import Action
 from cavsumo.egos.base import EGO_KIND
-from cavsumo.scene import Scene
-from cavsumo.snapshot import BodyState, Snapshot
+from cavsumo.model.bodies import Action
+from cavsumo.model.scene import Scene
+from cavsumo.model.snapshot import BodyState, Snapshot
 from cavsumo.testing.scripts import CROWDED, EMPTY, ODD, Ground, Script, driven
 
 MakeAgent = Callable[[], Agent]

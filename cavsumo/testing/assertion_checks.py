@@ -8,10 +8,10 @@ from collections.abc import Callable, Iterator, Mapping
 import numpy as np
 
 from cavsumo.assertions.base import NOT_TRIGGERED, SEVERITY, VIOLATED, Assertion, Judgement
-from cavsumo.contacts import Contact, ContactMonitor
+from cavsumo.assertions.contacts import Contact, ContactMonitor
 from cavsumo.egos.base import EGO_KIND
-from cavsumo.scene import Scene
-from cavsumo.snapshot import BodyState, Snapshot
+from cavsumo.model.scene import Scene
+from cavsumo.model.snapshot import BodyState, Snapshot
 from cavsumo.testing.scripts import Ground, Others, crowd, nobody, oddities
 
 MakeAssertion = Callable[[], Assertion]

@@ -12,11 +12,11 @@ import time
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 
-from cavsumo.contacts import STANDING_MPS
+from cavsumo.assertions.contacts import STANDING_MPS
 from cavsumo.egos.base import Acceleration, Command, Ego
 from cavsumo.egos.effectors import checked
 from cavsumo.errors import EgoError
-from cavsumo.snapshot import Snapshot
+from cavsumo.model.snapshot import Snapshot
 from cavsumo.testing.scripts import CROWDED, EMPTY, LONG, ODD, Ground, Script, drive
 
 MakeEgo = Callable[[], Ego]

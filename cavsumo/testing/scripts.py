@@ -13,12 +13,12 @@ from pathlib import Path
 
 import numpy as np
 
-from cavsumo.bodies import BICYCLE, BUS, CAR, PEDESTRIAN, Action, Body, Kind
 from cavsumo.egos.base import Acceleration, Command, Drive, Ego, Mission
-from cavsumo.kinematics import step_floats
-from cavsumo.scene import Scene
-from cavsumo.site import Site, derive_site
-from cavsumo.snapshot import BodyState, RawState, Snapshot
+from cavsumo.model.bodies import BICYCLE, BUS, CAR, PEDESTRIAN, Action, Body, Kind
+from cavsumo.model.kinematics import step_floats
+from cavsumo.model.scene import Scene
+from cavsumo.model.snapshot import BodyState, RawState, Snapshot
+from cavsumo.network.site import Site, derive_site
 
 DT = 0.1  # s
 SPEED = 8.0  # of an ego that does not say how fast it begins [m/s]

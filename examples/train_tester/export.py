@@ -8,8 +8,8 @@ import numpy as np
 from stable_baselines3 import DQN
 from stable_baselines3.common.vec_env import VecNormalize
 
-from cavsumo.observations import VERSION, entries
-from cavsumo.policies import Header, Observed, Policy
+from cavsumo.agents.observations import VERSION, entries
+from cavsumo.agents.policy_file import Header, Observed, Policy
 
 NOTHING = 1e9  # a scale that leaves nothing of an entry
 

@@ -1,0 +1,6 @@
+"""What is left of episodes: columns, rows, traces and manifests, written and read.
+
+``writing`` writes a batch, ``reading`` reads it, ``provenance`` says what identifies it. Nothing
+here plays an episode. To add a column: its name and meaning in ``columns``, its value in
+``batch/episode_runner``.
+"""
