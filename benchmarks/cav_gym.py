@@ -24,7 +24,7 @@ from cavsumo.agents.walking import steer_to
 from cavsumo.batch.dispatch import run_batch
 from cavsumo.batch.executors import local_executor
 from cavsumo.batch.jobs import job
-from cavsumo.batch.prepared import Setting, prepare
+from cavsumo.batch.prepared import PreparedBatch, prepare
 from cavsumo.batch.summary import interval, percent
 from cavsumo.batch.tally import tallied
 from cavsumo.model.bodies import PEDESTRIAN, Body
@@ -103,7 +103,7 @@ def force(runs: int) -> None:
     print(f"\n{'timing':>9}  {'tests, 95 %':>22}  unfair  forceable  won of them  of the bound")
     for testers in (1, 3, 6):
         count = runs if testers == 1 else runs // 2
-        made = setting(testers, ("timing",), count)
+        made = prepared(testers, ("timing",), count)
         possible = [forceable_episode(made.plan, made.site, run) for run in range(count)]
         rows = play(testers, ("timing",), count)
         found, bound = tallied(rows).rate("tests"), rate(sum(possible), count)
@@ -116,7 +116,7 @@ def force(runs: int) -> None:
         )
 
 
-def setting(testers: int, agents: tuple[str, ...], runs: int) -> Setting:
+def prepared(testers: int, agents: tuple[str, ...], runs: int) -> PreparedBatch:
     """The plan of a cell, ready to be played."""
     known = {"timing": {}, **dict.fromkeys(AGENTS, SETTINGS["params"])}
     params = known[agents[0]]
@@ -128,7 +128,7 @@ def setting(testers: int, agents: tuple[str, ...], runs: int) -> Setting:
 
 def play(testers: int, agents: tuple[str, ...], runs: int) -> list[dict[str, object]]:
     """The rows of a cell."""
-    made = setting(testers, agents, runs)
+    made = prepared(testers, agents, runs)
     with local_executor(2) as executor:
         return [outcome.row for outcome, _ in run_batch(made, executor, made.plan.todo())]
 

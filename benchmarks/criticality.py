@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import Any
 
 from cavsumo.assertions import criticality_monitor
-from cavsumo.batch.episode_runner import Theatre
+from cavsumo.batch.episode_runner import EpisodeRunner
 from cavsumo.batch.jobs import job
 from cavsumo.batch.prepared import prepare
 from cavsumo.model.scenario import plan_from
@@ -43,12 +43,12 @@ def main() -> None:
         net = NETWORKS / f"{network}.net.xml"
         settings = {"net": net, "runs": episodes, "trace": "none", "reference": "none"}
         plan = plan_from(settings, "benchmark")
-        with Theatre(plan, prepare(plan).site) as theatre:
-            theatre.play(job(plan, 0))
+        with EpisodeRunner(plan, prepare(plan).site) as runner:
+            runner.play(job(plan, 0))
             spent.clear()
             begun = time.process_time()
             for run in range(episodes):
-                theatre.play(job(plan, run))
+                runner.play(job(plan, run))
             whole = time.process_time() - begun
         shares = (f"{100 * spent[part] / whole:11.2f} %" for part in PARTS)
         print(f"{network:12}", *shares, f"{1e3 * whole / episodes:15.1f}")

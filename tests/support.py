@@ -10,7 +10,7 @@ from concurrent.futures import Executor, Future
 from pathlib import Path
 from typing import Any
 
-from cavsumo.batch.prepared import Setting
+from cavsumo.batch.prepared import PreparedBatch
 from cavsumo.results.reading import read_rows
 
 PATIENCE_S = 60.0
@@ -86,7 +86,7 @@ def alive(pid: int, started: str | None = None) -> bool:
 class Troupe(Executor):
     """Processes that stay for all batches of one setting, whatever their shards and rules."""
 
-    def __init__(self, own: Setting, executor: Executor) -> None:
+    def __init__(self, own: PreparedBatch, executor: Executor) -> None:
         self.own, self.executor = own, executor
 
     def submit(self, fn: Callable[..., Any], /, *args: Any, **kwargs: Any) -> Future[Any]:

@@ -16,7 +16,7 @@ import pytest
 
 from cavsumo.agents import AGENTS
 from cavsumo.agents.planning import response, solving
-from cavsumo.agents.planning.opponent import KEEPS, OLDEST, Counts, Watch, situation
+from cavsumo.agents.planning.opponent import KEEPS, OLDEST, AccelerationReader, Counts, situation
 from cavsumo.agents.planning.response import (
     SPEEDS,
     STAND,
@@ -49,7 +49,7 @@ def small(monkeypatch: pytest.MonkeyPatch) -> None:
 
 def watched(accelerations: list[float], v: float = 8.0) -> list[tuple[int, bool | None]]:
     """Age and whether it was chosen anew, after each timestep of an ego."""
-    watch, seen = Watch(DT), []
+    watch, seen = AccelerationReader(DT), []
     watch.see(v)
     for a in accelerations:
         v = max(0.0, v + a * DT)

@@ -16,7 +16,7 @@ from cavsumo.batch.certify.certificate import as_json, certified, rounded_down, 
 from cavsumo.batch.certify.ego_list import opponents
 from cavsumo.batch.certify.tested_policy import Subject, of_policy, of_run, settings_of
 from cavsumo.batch.certify.used_seeds import SUMO_SEEDS, fresh_seed, used
-from cavsumo.batch.episode_runner import Theatre
+from cavsumo.batch.episode_runner import EpisodeRunner
 from cavsumo.batch.jobs import job
 from cavsumo.batch.prepared import prepare
 from cavsumo.batch.replay import recorded, recorded_plan
@@ -89,8 +89,8 @@ def traced(plan: BatchPlan, run: int, seed: int | None = None) -> Trace:
     again = dataclasses.replace(job(plan, run), record=True)
     if seed is not None:
         again = dataclasses.replace(again, seed=seed)
-    with Theatre(plan, prepare(plan).site) as theatre:
-        return parsed(theatre.play(again)[0].trace)
+    with EpisodeRunner(plan, prepare(plan).site) as runner:
+        return parsed(runner.play(again)[0].trace)
 
 
 # What is played

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from cavsumo.assertions.contacts import ContactMonitor
 from cavsumo.assertions.criticality_monitor import (
     HORIZON_S,
-    Course,
+    CriticalityMonitor,
     Extremes,
     pet,
     stretches,
@@ -61,13 +61,13 @@ def snapshots(egos: Sequence[State], testers: Sequence[State]) -> list[Snapshot]
 
 def extremes(seen: Sequence[Snapshot]) -> tuple[Extremes, list[Snapshot]]:
     """What is found, and the snapshots before the first contact."""
-    course, monitor = Course(), ContactMonitor()
+    criticality, monitor = CriticalityMonitor(), ContactMonitor()
     before: list[Snapshot] = []
     for snapshot in seen:
-        course.observe(snapshot, monitor.observe(snapshot))
+        criticality.observe(snapshot, monitor.observe(snapshot))
         if not monitor.ego_pairs:
             before.append(snapshot)
-    return course.extremes(), before
+    return criticality.extremes(), before
 
 
 def velocity(state: BodyState) -> tuple[float, float]:
@@ -130,7 +130,7 @@ def test_hand_computed() -> None:
 def test_nobody_is_not_critical() -> None:
     """Without testers, or with an ego that stands, there is nothing to measure."""
     nothing = Extremes(math.inf, 0.0, math.inf)
-    assert Course().extremes() == nothing
+    assert CriticalityMonitor().extremes() == nothing
     still = snapshots([(0.0, 0.0, 0.0, 0.0)] * 5, moved((20.0, 0.0, 1.4, math.pi), 5))
     assert extremes(still)[0] == nothing
 

@@ -197,10 +197,10 @@ def test_a_network_that_differs_is_replaced_only_when_told(
 
 def test_pedestrian_signals_are_an_option_of_netconvert() -> None:
     """--keep-pedestrian-signals leaves out what discards them."""
-    from cavsumo.cli.commands.import_osm import Order, _options
+    from cavsumo.cli.commands.import_osm import ImportOptions, _options
 
     for keep in (False, True):
-        order = Order(CROSSROADS, Path("x.net.xml"), None, False, keep, False, False, 60.0)
+        order = ImportOptions(CROSSROADS, Path("x.net.xml"), None, False, keep, False, False, 60.0)
         assert ("tls.discard-simple" in _options(order, None)) != keep
 
 

@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 
 from cavsumo.agents.planning import solved as solutions
 from cavsumo.agents.planning.coordinates import Coordinates, Relative
-from cavsumo.agents.planning.forceability import Constant, Free, Unaware
+from cavsumo.agents.planning.forceability import ConstantSpeed, Free, Unaware
 from cavsumo.agents.planning.lattice import build
 from cavsumo.agents.planning.rules import Rules, against_any, against_constant
 from cavsumo.agents.planning.solved import Solved, solved
@@ -144,10 +144,10 @@ def test_values_between_the_points() -> None:
     assert middle == pytest.approx((first + second) / 2)
 
 
-def outlooks(kerb: float) -> tuple[Constant, Unaware, Free]:
+def outlooks(kerb: float) -> tuple[ConstantSpeed, Unaware, Free]:
     """One body's view of the three classes."""
     free = Unaware(PEDESTRIAN, solved(FREE), B, 0.02, kerb), Free(PEDESTRIAN, solved(FREE), B, 0.02)
-    return Constant(PEDESTRIAN, solved(SMALL), B, 0.02), *free
+    return ConstantSpeed(PEDESTRIAN, solved(SMALL), B, 0.02), *free
 
 
 @settings(deadline=None)

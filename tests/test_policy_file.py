@@ -17,7 +17,7 @@ from support import rows
 from cavsumo.agents import Agent, Scene
 from cavsumo.agents.observations import VERSION, entries
 from cavsumo.agents.policy import PolicyAgent, effort, make_agent, parameters_of
-from cavsumo.agents.policy_file import Header, Observed, Policy, read_policy, write_policy
+from cavsumo.agents.policy_file import Header, Observed, TrainedPolicy, read_policy, write_policy
 from cavsumo.cli import main
 from cavsumo.cli.listings import listing
 from cavsumo.errors import InputError, UnknownName
@@ -36,7 +36,7 @@ def header(**changed: Any) -> Header:
     return Header(**{"observation": Observed(version=VERSION, names=tuple(names))} | changed)
 
 
-def policy(outputs: int = 2, hidden: int = 4, **changed: Any) -> Policy:
+def policy(outputs: int = 2, hidden: int = 4, **changed: Any) -> TrainedPolicy:
     """A policy with one hidden layer and fixed random weights."""
     said = header(**changed)
     rng, n, bodies = np.random.default_rng(7), len(said.observation.names), said.bodies
@@ -45,14 +45,14 @@ def policy(outputs: int = 2, hidden: int = 4, **changed: Any) -> Policy:
         (0.1 * rng.normal(size=(hidden, outputs)), 0.1 * rng.normal(size=outputs)),
     )
     table = rng.uniform(-1, 1, (outputs, 2 * bodies)) if said.actions == "table" else None
-    return Policy(said, np.zeros(n), np.full(n, 10.0), layers, table)
+    return TrainedPolicy(said, np.zeros(n), np.full(n, 10.0), layers, table)
 
 
-def constant(*outputs: float, **changed: Any) -> Policy:
+def constant(*outputs: float, **changed: Any) -> TrainedPolicy:
     """A policy that says the same whatever it sees."""
     n = len(NAMES)
     layer = np.zeros((n, len(outputs))), np.array(outputs)
-    return Policy(header(**changed), np.zeros(n), np.ones(n), (layer,))
+    return TrainedPolicy(header(**changed), np.zeros(n), np.ones(n), (layer,))
 
 
 @pytest.mark.parametrize("actions", ["effectors", "table", "targets"])
@@ -88,7 +88,7 @@ def test_actions_come_out_of_the_effectors_ranges_and_of_the_table() -> None:
     table = np.array([[-1.0, 0.0], [1.0, 0.25], [1.0, -0.25]])
     layer = (np.zeros((len(NAMES), 3)), np.array([0.0, 2.0, 2.0]))
     n = len(NAMES)
-    made = Policy(header(actions="table"), np.zeros(n), np.ones(n), (layer,), table)
+    made = TrainedPolicy(header(actions="table"), np.zeros(n), np.ones(n), (layer,), table)
     assert made.efforts(seen) == [(1.0, 0.25)]
     assert constant(0.0, 1.0, 5.0, 2.0, 3.0, actions="targets").targets(seen) == [2]
 

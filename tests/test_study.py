@@ -308,12 +308,12 @@ def test_the_experiment_can_be_played() -> None:
         f"{place}-testers{n}" for place in ("straight", "crossing", "junction") for n in (1, 3, 6)
     ]
     for part in parts:
-        setting = prepare(plan_from(part.settings, part.name))
-        plan = setting.plan
+        prepared = prepare(plan_from(part.settings, part.name))
+        plan = prepared.plan
         assert (plan.runs, plan.trace) == (250, "none")
         assert plan.cast["nearest"] == "election"
         assert plan.agent_params("nearest", ["rule"])["rule"] == "unsigned"
-        assert setting.site.demand is None
+        assert prepared.site.demand is None
         assert (plan.scenario.routes is None) == part.name.startswith("straight")
 
 

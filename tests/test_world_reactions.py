@@ -104,9 +104,9 @@ def test_shown_in_its_true_width_the_same_pedestrian_stops_the_ego(open_world: O
 
 def test_persons_on_a_real_junction_do_not_crash_sumo(set_up: Callable[..., Any]) -> None:
     """Episodes with testers shown as persons among marked crossings run to their end."""
-    setting = set_up("crossing", embodiment="person", agents=["programmed-random"], runs=3)
-    with Worker(setting) as worker:
-        rows = [worker.play(job(setting.plan, run))[0].row for run in setting.plan.todo()]
+    prepared = set_up("crossing", embodiment="person", agents=["programmed-random"], runs=3)
+    with Worker(prepared) as worker:
+        rows = [worker.play(job(prepared.plan, run))[0].row for run in prepared.plan.todo()]
     assert [row.get("error") for row in rows] == [None] * 3
     assert sum(row["steps"] for row in rows) > 150
 

@@ -12,7 +12,7 @@ import math
 from collections.abc import Sequence
 
 from cavsumo.agents.planning.coordinates import Coordinates, Relative
-from cavsumo.agents.planning.forceability import LEAST_MPS, Outlook
+from cavsumo.agents.planning.forceability import LEAST_MPS, Forceability
 from cavsumo.agents.walking import ApproachKerb, walk
 from cavsumo.model.bodies import Action
 from cavsumo.model.kinematics import step_floats
@@ -36,7 +36,11 @@ class Tactic:
     """
 
     def __init__(
-        self, scene: Scene, index: int, outlooks: Sequence[Outlook], escape: float | None = None
+        self,
+        scene: Scene,
+        index: int,
+        outlooks: Sequence[Forceability],
+        escape: float | None = None,
     ) -> None:
         self.scene, self.index, self.outlooks = scene, index, tuple(outlooks)
         self.where = Coordinates(scene, index)

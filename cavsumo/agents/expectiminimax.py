@@ -16,7 +16,7 @@ from cavsumo.agents.body_policy import Tactic
 from cavsumo.agents.lookahead import succeeds
 from cavsumo.agents.planning.classes import EGO_CLASSES
 from cavsumo.agents.planning.coordinates import Coordinates
-from cavsumo.agents.planning.forceability import Constant, Free, Outlook, Unaware
+from cavsumo.agents.planning.forceability import ConstantSpeed, Forceability, Free, Unaware
 from cavsumo.agents.planning.rules import Rules, against_any, against_constant
 from cavsumo.agents.planning.solved import solved
 from cavsumo.agents.triggers import MAX_DECEL, REACTION_TIME
@@ -172,11 +172,11 @@ class ExpectiminimaxAgent(Agent):
         )
         return [free, constant]
 
-    def _outlooks_of(self, index: int) -> tuple[Outlook, ...]:
+    def _outlooks_of(self, index: int) -> tuple[Forceability, ...]:
         """How one body judges its chances."""
         scene, tables = self.scene, [solved(rules) for rules in self._rules()]
         kind = scene.bodies[index].kind
-        found: list[Outlook] = [Constant(kind, tables[-1], MAX_DECEL, scene.dt)]
+        found: list[Forceability] = [ConstantSpeed(kind, tables[-1], MAX_DECEL, scene.dt)]
         met = Coordinates(scene, index).meeting
         if self.against == "any":
             found.insert(0, Free(kind, tables[0], MAX_DECEL, scene.dt))

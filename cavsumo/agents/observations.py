@@ -85,7 +85,7 @@ def entries(bodies: int, v_max: float, steering_max: float) -> tuple[Bounds, ...
     )
 
 
-class Observer:
+class TeamObserver:
     """Shows the snapshots of one episode to the owner of some bodies; made anew at each reset.
 
     Attributes:

@@ -81,7 +81,7 @@ class Header(BaseModel):
 
 
 @dataclass(frozen=True, eq=False)
-class Policy:
+class TrainedPolicy:
     """A policy; ValueError says what does not fit together.
 
     Attributes:
@@ -152,7 +152,10 @@ class Policy:
         return [int(best) for best in np.argmax(scores, axis=1)]
 
 
-def read_policy(file: Path) -> Policy:
+Policy = TrainedPolicy  # its name in version 0.1
+
+
+def read_policy(file: Path) -> TrainedPolicy:
     """The policy in a file; InputError in one sentence when there is none."""
     where = f"policy {str(file)!r}"
     try:
@@ -170,7 +173,7 @@ def read_policy(file: Path) -> Policy:
         raise InputError(f"{where}: {' '.join(str(error).split())}") from error
 
 
-def write_policy(file: Path, policy: Policy) -> None:
+def write_policy(file: Path, policy: TrainedPolicy) -> None:
     """Write a policy; the same policy gives the same bytes."""
     header = np.array(json.dumps(policy.header.model_dump(mode="json")))
     arrays: dict[str, Any] = {"header": header, "mean": policy.mean, "scale": policy.scale}
@@ -196,7 +199,7 @@ def _arrays(content: bytes) -> dict[str, NDArray[Any]]:
         raise ValueError(f"no .npz archive of plain arrays ({error})") from error
 
 
-def _assembled(arrays: Mapping[str, NDArray[Any]]) -> Policy:
+def _assembled(arrays: Mapping[str, NDArray[Any]]) -> TrainedPolicy:
     """The policy that the arrays of a file make."""
     if "header" not in arrays or arrays["header"].dtype.kind != "U":
         raise ValueError("no policy: it has no header")
@@ -214,7 +217,7 @@ def _assembled(arrays: Mapping[str, NDArray[Any]]) -> Policy:
         if name not in wanted and name != "header":
             raise ValueError(f"it has an array {name!r} that no policy has")
     found = {name: _floats(name, arrays[name]) for name in wanted}
-    return Policy(
+    return TrainedPolicy(
         header,
         found["mean"],
         found["scale"],

@@ -34,7 +34,7 @@ class Extremes(NamedTuple):
     pet: float  # smallest post-encroachment time, 0 with a contact [s]
 
 
-class Course:
+class CriticalityMonitor:
     """What happened between the ego and the testers, until they first touch."""
 
     def __init__(self) -> None:

@@ -8,7 +8,7 @@ from cavsumo.model.kinematics import wrap
 from cavsumo.model.snapshot import BodyState, Snapshot
 
 
-class Conduct:
+class Naturalness:
     """Adds up the testers' accelerations and turns during one episode.
 
     Attributes:

@@ -7,10 +7,10 @@ The precondition is that a tester's body enters the ego's reaction zone before i
 braking zone or the ego: late enough to be hard, early enough for a vehicle that brakes at once.
 A body that touches the braking zone or the ego first makes the episode unfair.
 
-Vehicles among the testers count by where they will be and only in the ego's way (``fairness``): one
-that is followed at an ordinary distance is in no zone until it brakes, one beside in its own lane
-never. A vehicle that drives into the ego's side or rear after the trigger makes the episode
-unfair: no ego could have done anything about it.
+Vehicles among the testers count by where they will be and only in the ego's way
+(``zone_presence``): one that is followed at an ordinary distance is in no zone until it brakes, one
+beside in its own lane never. A vehicle that drives into the ego's side or rear after the trigger
+makes the episode unfair: no ego could have done anything about it.
 """
 
 from __future__ import annotations

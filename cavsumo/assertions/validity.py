@@ -48,7 +48,7 @@ class Breach(NamedTuple):
         return f"{self.tester} {self.what} at {self.time:.1f} s"
 
 
-class Umpire:
+class ValidityMonitor:
     """Follows one episode.
 
     Attributes:

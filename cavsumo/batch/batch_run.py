@@ -10,7 +10,7 @@ from typing import Any
 
 from cavsumo.batch.dispatch import run_batch
 from cavsumo.batch.learning import Lessons
-from cavsumo.batch.prepared import Setting
+from cavsumo.batch.prepared import PreparedBatch
 from cavsumo.batch.progress import Progress
 from cavsumo.batch.stopping import stopping_rule
 from cavsumo.batch.tally import Tally
@@ -25,11 +25,11 @@ LOOK_AHEAD = 4  # episodes under way or waiting for their turn, for each that is
 
 
 @dataclass
-class Session:
+class BatchRun:
     """A batch under way; call ``begin`` or ``resume``, then what is to be done, then ``end``.
 
     Attributes:
-        setting, recorder: what is played, and who writes it.
+        prepared, recorder: what is played, and who writes it.
         executor, jobs: who plays it, and how many episodes at a time.
         stopped: says whether somebody asked to stop.
         quiet: no progress.
@@ -38,7 +38,7 @@ class Session:
         cut_short: whether somebody stopped it before all errors were played again.
     """
 
-    setting: Setting
+    prepared: PreparedBatch
     recorder: Recorder
     executor: Executor
     jobs: int
@@ -50,14 +50,14 @@ class Session:
 
     def begin(self, manifest: Mapping[str, Any], *, overwrite: bool = False) -> None:
         """Start the results file."""
-        self._todo = self.setting.plan.todo()
-        self._lessons = Lessons(self.setting, {})
+        self._todo = self.prepared.plan.todo()
+        self._lessons = Lessons(self.prepared, {})
         self.recorder.begin(manifest, overwrite=overwrite)
 
     def resume(self, manifest: Mapping[str, Any]) -> None:
         """Take up the rows that are there."""
-        self._todo = self.setting.plan.todo()
-        self._lessons = Lessons(self.setting, manifest)
+        self._todo = self.prepared.plan.todo()
+        self._lessons = Lessons(self.prepared, manifest)
         for row in self.recorder.resume(manifest, self._todo):
             self.tally.add(row)
             self._lessons.seen(row)
@@ -68,9 +68,9 @@ class Session:
     def play(self) -> None:
         """Play what is left, until the end or a reason to stop."""
         self.status = "broken"
-        rule = stopping_rule(self.setting.plan)
+        rule = stopping_rule(self.prepared.plan)
         reason = rule(self.tally)
-        with Progress(self.setting.plan.size, self.quiet, self.tally.rows) as progress:
+        with Progress(self.prepared.plan.size, self.quiet, self.tally.rows) as progress:
             for outcome, memory in self._answers(self._todo) if reason is None else ():
                 row = self.recorder.write(outcome)
                 self.tally.add(row)
@@ -80,7 +80,7 @@ class Session:
                 reason = rule(self.tally)
                 if reason is not None:
                     break
-        missing = self.tally.rows < self.setting.plan.size
+        missing = self.tally.rows < self.prepared.plan.size
         self.status = "stopped" if reason else "interrupted" if missing else "finished"
         self.recorder.manifest["stopped_by"] = reason
 
@@ -89,7 +89,7 @@ class Session:
 
         An agent that learns missed a lesson then: it starts anew, and its later rows change too.
         """
-        todo, pupils = _to_retry(self.recorder.csv_file, self.setting.plan, self._lessons.names)
+        todo, pupils = _to_retry(self.recorder.csv_file, self.prepared.plan, self._lessons.names)
         known = self._lessons.known()
         self._lessons.forget(pupils)
         replaced: dict[int, Outcome] = {}
@@ -115,7 +115,7 @@ class Session:
     def _answers(self, todo: Iterable[int]) -> Iterator[Answer]:
         """Have episodes played."""
         return run_batch(
-            self.setting,
+            self.prepared,
             self.executor,
             todo,
             memories=self._lessons.memories,

@@ -24,7 +24,7 @@ from typing import Any
 
 from cavsumo.agents.casting import learners
 from cavsumo.batch.jobs import Job, failed, job
-from cavsumo.batch.prepared import Setting
+from cavsumo.batch.prepared import PreparedBatch
 from cavsumo.batch.worker import Answer, play
 from cavsumo.errors import BatchError, CavsumoError
 
@@ -32,7 +32,7 @@ POLL_S = 0.2  # how often to look whether to stop, while nothing finishes
 
 
 def run_batch(
-    setting: Setting,
+    prepared: PreparedBatch,
     executor: Executor,
     todo: Iterable[int],
     *,
@@ -51,7 +51,7 @@ def run_batch(
         ahead: how many episodes to have under way or waiting for their turn to come out.
         stopped: asked all the time; once true, what runs is finished and nothing more is begun.
     """
-    line = _Line(setting, executor, todo, dict(memories or {}))
+    line = _Line(prepared, executor, todo, dict(memories or {}))
     try:
         while True:
             if stopped():
@@ -84,12 +84,16 @@ class _Line:
     """Episodes in the order in which they come out; each is submitted as soon as it can be."""
 
     def __init__(
-        self, setting: Setting, executor: Executor, todo: Iterable[int], memories: dict[str, Any]
+        self,
+        prepared: PreparedBatch,
+        executor: Executor,
+        todo: Iterable[int],
+        memories: dict[str, Any],
     ) -> None:
-        self.setting, self.executor, self.memories = setting, executor, memories
+        self.prepared, self.executor, self.memories = prepared, executor, memories
         self._coming = self._grouped(todo)
         self.entries: deque[_Entry] = deque()
-        self._learners = learners(setting.plan)
+        self._learners = learners(prepared.plan)
 
     def join(self, ahead: int) -> None:
         """Take up episodes until so many are in line, and submit those that can start."""
@@ -133,21 +137,21 @@ class _Line:
 
     def _grouped(self, runs: Iterable[int]) -> Iterator[_Entry]:
         """Episodes that share a simulation together."""
-        block, agents = self.setting.plan.block, tuple(self.setting.plan.cast)
+        block, agents = self.prepared.plan.block, tuple(self.prepared.plan.cast)
         for _, group in groupby(runs, lambda run: run // block):
             wanted = tuple(group)
             yield _Entry(wanted, agents[wanted[0] % len(agents)])
 
     def _jobs(self, entry: _Entry) -> list[Job]:
         """The jobs of an entry, from the beginning of the simulation that they share."""
-        plan, last = self.setting.plan, entry.wanted[-1]
+        plan, last = self.prepared.plan, entry.wanted[-1]
         memory = self.memories.get(entry.agent)
         return [job(plan, run, memory) for run in range(last - last % plan.block, last + 1)]
 
     def _submit(self, entry: _Entry) -> None:
         """Hand an entry to the executor."""
         try:
-            entry.future = self.executor.submit(play, self.setting, self._jobs(entry))
+            entry.future = self.executor.submit(play, self.prepared, self._jobs(entry))
         except RuntimeError as error:  # as executors say that they are shut down or broken
             raise BatchError(f"the executor takes no more episodes: {error}") from error
 
@@ -162,6 +166,6 @@ class _Line:
             raise
         except Exception as error:  # such as dask's KilledWorker
             said = f"the executor lost it: {type(error).__name__}: {error}"
-            plan = self.setting.plan
+            plan = self.prepared.plan
             answers = [(failed(plan, j, said, 0.0), j.memory) for j in self._jobs(entry)]
         return [answer for answer in answers if answer[0].row["run"] in entry.wanted]

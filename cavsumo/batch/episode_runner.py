@@ -18,45 +18,45 @@ from cavsumo.model.seeds import episode_seed
 from cavsumo.network.site import Site
 from cavsumo.results.rows import Outcome, Row, verdicts_cell
 from cavsumo.results.traces import frame, origin, trace_head, trace_text
-from cavsumo.simulation.avoidability import Retrial, Verdict
+from cavsumo.simulation.avoidability import Avoidability, AvoidabilityCheck
 from cavsumo.simulation.loop import Episode, play
-from cavsumo.simulation.setup import set_stage
+from cavsumo.simulation.setup import make_setup
 
 
-class Theatre:
+class EpisodeRunner:
     """A plan set up in this process: plays jobs one after another; a context manager."""
 
     def __init__(self, plan: BatchPlan, site: Site) -> None:
         self.plan = plan
-        self.stage = set_stage(plan.scenario, site)
+        self.setup = make_setup(plan.scenario, site)
         self._agents: dict[str, tuple[list[Agent], tuple[Any, ...] | None]] = {}
 
-    def __enter__(self) -> Theatre:
+    def __enter__(self) -> EpisodeRunner:
         return self
 
     def __exit__(self, *_: object) -> None:
-        self.stage.close()
+        self.setup.close()
 
     @cached_property
     def _origin(self) -> dict[str, Any]:
         """What the traces of all episodes have in common."""
-        return origin(self.plan, self.stage.site)
+        return origin(self.plan, self.setup.site)
 
-    def rehearse(self, *, strict: bool = True) -> None:
+    def try_out(self, *, strict: bool = True) -> None:
         """Start the ego and SUMO once: what they refuse comes out before anything is written.
 
         In the middle of a batch, not ``strict``, an ego that cannot be started is no refusal: each
         episode tries again, and is an error if that fails.
         """
         try:
-            self.stage.ego.prepare(self.stage.mission)
+            self.setup.ego.prepare(self.setup.mission)
         except EgoError:
             if strict:
                 raise
         for label in self.plan.cast:
             make_agents(self.plan, label)[0].prepare()
         simulation: Simulation = "own" if self.plan.reset == "fresh" else "new"
-        self.stage.world.reset(episode_seed(self.plan.seed, 0), (), (), simulation=simulation)
+        self.setup.world.reset(episode_seed(self.plan.seed, 0), (), (), simulation=simulation)
 
     def play(
         self, job: Job, beat: Callable[[], None] = lambda: None
@@ -74,25 +74,25 @@ class Theatre:
             record = job.record or (self.plan.trace != "none" and own)
             retry = own and self.plan.reference != "none"
             episode = play(
-                self.stage, agents, job.seed, record=record, keep=retry, simulation=job.simulation
+                self.setup, agents, job.seed, record=record, keep=retry, simulation=job.simulation
             )
             memory = _recall(agents)
             row = head(self.plan, job) | measured(episode)
-            log = self.stage.ego.take_log()
+            log = self.setup.ego.take_log()
             if retry and episode.outcome == VIOLATED:
-                retrial = Retrial(self.stage, agents, job.seed, record, episode, beat)
+                retrial = AvoidabilityCheck(self.setup, agents, job.seed, record, episode, beat)
                 row |= self._avoidable(retrial)
             trace = self._trace(job, row, before, episode) if record else ""
         except Exception as error:  # whatever it is, it costs this row and no other
             said = str(error) if isinstance(error, CavsumoError) else f"defect: {error!r}"
             row, trace, memory = failed_row(self.plan, job, said), "", job.memory
         row["wall_s"] = time.perf_counter() - begun
-        said_later = self.stage.ego.take_log()  # of an episode that failed; a rerun's is not kept
+        said_later = self.setup.ego.take_log()  # of an episode that failed; a rerun's is not kept
         return Outcome(row, trace, log or said_later), memory
 
-    def _avoidable(self, retrial: Retrial) -> Row:
+    def _avoidable(self, retrial: AvoidabilityCheck) -> Row:
         """Whether the plan's reference driver would have avoided a violation."""
-        verdict: Verdict = retrial.judged(REFERENCES.make(self.plan.reference, {}))
+        verdict: Avoidability = retrial.judged(REFERENCES.make(self.plan.reference, {}))
         avoidable = None if verdict.avoidable is None else int(verdict.avoidable)
         return {
             "avoidable": avoidable,
@@ -126,7 +126,7 @@ def measured(episode: Episode) -> Row:
     judgement, contacts = episode.judgement, episode.contacts
     if episode.invalid and episode.breach:  # what the assertions said is in ``verdicts``
         judgement = Judgement("", INVALID, episode.breach.tester)
-    ttc, drac, pet = episode.course.extremes()
+    ttc, drac, pet = episode.criticality.extremes()
     with_ego = {pair for pair in episode.sumo_collisions if "ego" in pair}
     forecast = episode.forecast
     return {
@@ -152,7 +152,7 @@ def measured(episode: Episode) -> Row:
         "max_decel_mps2": episode.max_decel,
         "cost": episode.cost,
         "accel_rms_mps2": episode.rms_acceleration,
-        "turning_rad": episode.conduct.turning,
+        "turning_rad": episode.naturalness.turning,
         "reward": episode.reward,
         "contacts": len(contacts.ego_pairs),
         "tester_contacts": len(contacts.tester_pairs),

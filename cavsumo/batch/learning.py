@@ -12,7 +12,7 @@ from typing import Any
 
 from cavsumo.agents.casting import learners
 from cavsumo.batch.dispatch import run_batch
-from cavsumo.batch.prepared import Setting
+from cavsumo.batch.prepared import PreparedBatch
 from cavsumo.batch.tally import Row
 
 CHECKPOINT_EVERY = 20  # lessons between two notes of what is known
@@ -27,13 +27,13 @@ class Lessons:
         owed: episodes whose rows are there and whose lesson is not.
     """
 
-    def __init__(self, setting: Setting, recorded: Mapping[str, Any]) -> None:
-        self.names = learners(setting.plan)
+    def __init__(self, prepared: PreparedBatch, recorded: Mapping[str, Any]) -> None:
+        self.names = learners(prepared.plan)
         known, after = recorded.get("learned", {}), recorded.get("learned_after", {})
         self.memories = {name: known[name] for name in self.names if name in known}
         self.after = {name: int(after.get(name, -1)) for name in self.names}
         self.owed: list[int] = []
-        self._setting, self._unnoted = setting, 0
+        self._prepared, self._unnoted = prepared, 0
 
     def seen(self, row: Row) -> None:
         """A row that was there already."""
@@ -57,7 +57,7 @@ class Lessons:
     def catch_up(self, executor: Executor) -> None:
         """Play the episodes whose lesson is owed."""
         for outcome, memory in run_batch(
-            self._setting, executor, self.owed, memories=self.memories
+            self._prepared, executor, self.owed, memories=self.memories
         ):
             self.learned(outcome.row, memory)
         self.owed = []

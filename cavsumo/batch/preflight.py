@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from cavsumo.batch.prepared import Setting, manifest, prepare
+from cavsumo.batch.prepared import PreparedBatch, manifest, prepare
 from cavsumo.errors import InputError, ResultsError
 from cavsumo.model.scenario import plan_from
 from cavsumo.model.study import Part
@@ -36,24 +36,24 @@ class Manner:
 
 
 @dataclass(frozen=True)
-class Checked:
+class CheckedBatch:
     """A batch ready to be played.
 
     Attributes:
         name: which part of a study it is; empty for none.
         output: its results file.
-        setting, manifest: what is played.
+        prepared, manifest: what is played.
         recorded: the manifest of the batch to go on with, None for a new one.
     """
 
     name: str
     output: Path
-    setting: Setting
+    prepared: PreparedBatch
     manifest: Mapping[str, Any]
     recorded: Mapping[str, Any] | None
 
 
-def checked(parts: Sequence[Part], output: Path, manner: Manner) -> list[Checked]:
+def checked(parts: Sequence[Part], output: Path, manner: Manner) -> list[CheckedBatch]:
     """Check all parts of a run before any is played; raises InputError in one sentence."""
     batches = [_checked(part, part.output(output), manner) for part in parts]
     for batch in batches:
@@ -63,17 +63,17 @@ def checked(parts: Sequence[Part], output: Path, manner: Manner) -> list[Checked
     return batches
 
 
-def _checked(part: Part, output: Path, manner: Manner) -> Checked:
+def _checked(part: Part, output: Path, manner: Manner) -> CheckedBatch:
     """Check one part."""
     _check_output(output)
     recorded = _recorded(output, manner)
     source = f"run: {part.name}" if part.name else "run"
-    setting = prepare(plan_from({**recorded_settings(recorded), **part.settings}, source))
-    now = manifest(setting)
+    prepared = prepare(plan_from({**recorded_settings(recorded), **part.settings}, source))
+    now = manifest(prepared)
     different = [] if recorded is None else list(differences(recorded, now))
     if different:
         raise ResultsError(f"results {str(output)!r} are of another batch: {'; '.join(different)}")
-    return Checked(part.name, output, setting, now, recorded)
+    return CheckedBatch(part.name, output, prepared, now, recorded)
 
 
 def _check_output(output: Path) -> None:

@@ -29,7 +29,7 @@ from cavsumo.sumo.options import OPTIONS
 
 
 @dataclass(frozen=True)
-class Setting:
+class PreparedBatch:
     """What a process needs to play the jobs of a batch.
 
     Attributes:
@@ -58,7 +58,7 @@ class Setting:
             raise InputError(f"{name} is {here} in the process that simulates, expected {there}")
 
 
-def prepare(plan: BatchPlan, ego: Ego | None = None) -> Setting:
+def prepare(plan: BatchPlan, ego: Ego | None = None) -> PreparedBatch:
     """Check every name and parameter of a plan and derive its site; raises InputError.
 
     ``ego`` drives instead of the one that the plan names.
@@ -92,7 +92,7 @@ def prepare(plan: BatchPlan, ego: Ego | None = None) -> Setting:
     if site.approaches:  # that there is room for them must not come out an episode at a time
         kinds, rng = [kind] * scenario.testers, np.random.default_rng(plan.seed)
         site.draw(kinds, ego.kind, scenario.start_speed, rng)
-    return Setting(plan, site, str(Path.cwd()), checksums(plan), versions())
+    return PreparedBatch(plan, site, str(Path.cwd()), checksums(plan), versions())
 
 
 def wishes(plan: BatchPlan, kind: Kind, ego: Ego) -> Wishes:
@@ -143,14 +143,14 @@ def _types(plan: BatchPlan) -> tuple[str, ...]:
     return types_for(names.pop()) if len(names) == 1 else ()
 
 
-def manifest(setting: Setting) -> dict[str, Any]:
+def manifest(prepared: PreparedBatch) -> dict[str, Any]:
     """What makes a batch reproducible."""
     return {
         "command": ["cavsumo", *sys.argv[1:]],
-        "plan": setting.plan.model_dump(mode="json"),
-        "ego_route": list(setting.site.route.edges),
-        "junction": setting.site.route.junction,
-        "sha256": dict(setting.checksums) | traffic_checksum(setting.site),
-        "versions": dict(setting.versions),
+        "plan": prepared.plan.model_dump(mode="json"),
+        "ego_route": list(prepared.site.route.edges),
+        "junction": prepared.site.route.junction,
+        "sha256": dict(prepared.checksums) | traffic_checksum(prepared.site),
+        "versions": dict(prepared.versions),
         "sumo_options": dict(OPTIONS),
     }

@@ -175,7 +175,7 @@ def replayed(worker: Worker, record: Record) -> Outcome:
     Learners first live through their earlier episodes, or are told what they knew if a trace
     stands alone; an episode of a shared simulation comes after those before it.
     """
-    plan, run = worker.setting.plan, record.run
+    plan, run = worker.prepared.plan, record.run
     if record.alone and record.trace is not None:
         row, memory = record.row, record.trace.head["memory"]
         again = Job(run, row["agent"], int(row["seed"]), memory, record=True)
@@ -188,7 +188,7 @@ def replayed(worker: Worker, record: Record) -> Outcome:
 
 def known(worker: Worker, run: int) -> tuple[Any, ...] | None:
     """What the agents of an episode knew before it; a learner lives through its earlier ones."""
-    plan, memory = worker.setting.plan, job(worker.setting.plan, run).memory
+    plan, memory = worker.prepared.plan, job(worker.prepared.plan, run).memory
     step = len(plan.agents)
     learns = job(plan, run).agent in learners(plan)
     for earlier in range(run % step, run, step) if learns else ():

@@ -23,7 +23,7 @@ from multiprocessing.connection import Connection
 from typing import Any
 
 from cavsumo.batch.jobs import Job, failed
-from cavsumo.batch.prepared import Setting
+from cavsumo.batch.prepared import PreparedBatch
 from cavsumo.batch.worker_process import GOES_ON, GOODBYE
 from cavsumo.errors import BatchError, InputError
 from cavsumo.model.processes import ending, inner_environment
@@ -41,8 +41,8 @@ Answer = tuple[Outcome, Any]  # an outcome, and what the agents know afterwards
 class Worker:
     """A process with one SUMO in it, replaced when it dies; a context manager."""
 
-    def __init__(self, setting: Setting) -> None:
-        self.setting = setting
+    def __init__(self, prepared: PreparedBatch) -> None:
+        self.prepared = prepared
         self._process: subprocess.Popen[bytes] | None = None
         self._busy = threading.Lock()
         self._played = 0
@@ -56,7 +56,7 @@ class Worker:
         self.close()
 
     def start(self) -> None:
-        """Start the process; raises InputError when it refuses the setting."""
+        """Start the process; raises InputError when it refuses the batch."""
         with self._busy:
             self._start(strict=True)
 
@@ -71,10 +71,10 @@ class Worker:
                 self._stop()
             try:
                 return self._ask(job)
-            except _Gone as gone:
+            except _ProcessGone as gone:
                 self._stop()
                 wall = time.perf_counter() - begun
-                return failed(self.setting.plan, job, str(gone), wall), job.memory
+                return failed(self.prepared.plan, job, str(gone), wall), job.memory
 
     def close(self) -> None:
         """End the process for good: in peace, or at once while another thread waits for it."""
@@ -89,7 +89,7 @@ class Worker:
         _WORKERS.discard(self)
 
     def _start(self, *, strict: bool) -> None:
-        """Start the process, wait until it has rehearsed; nothing to do if it runs.
+        """Start the process and wait until it can play; nothing to do if it runs.
 
         Strict, an ego that cannot be started is a reason to refuse.
         """
@@ -99,7 +99,7 @@ class Worker:
             self._launch(strict)
             try:
                 refusal = self._receive(STARTUP_S)
-            except _Gone as gone:
+            except _ProcessGone as gone:
                 self._stop()
                 refusal = f"the simulation cannot be started: {gone}"
             else:
@@ -123,16 +123,16 @@ class Worker:
                 continue
             answer: Answer | str = GOES_ON
             while answer == GOES_ON:  # each simulation has the whole deadline
-                answer = self._receive(self.setting.plan.deadline_s)
+                answer = self._receive(self.prepared.plan.deadline_s)
             if not isinstance(answer, str):
                 self._played += 1
                 return answer
             assert answer == GOODBYE
             self._stop()
-        raise _Gone("the simulation process died again and again while it waited")
+        raise _ProcessGone("the simulation process died again and again while it waited")
 
     def _launch(self, strict: bool) -> None:
-        """Start the process and hand over the setting."""
+        """Start the process and hand over the batch."""
         if self.closed:
             raise BatchError("the batch is over")
         self._played = 0
@@ -149,32 +149,32 @@ class Worker:
             self._process = subprocess.Popen(
                 [sys.executable, "-P", "-m", "cavsumo.batch.worker_process", *map(str, numbers)],
                 pass_fds=fds,
-                cwd=self.setting.folder,
+                cwd=self.prepared.folder,
                 env=environment,
                 stdin=subprocess.DEVNULL,
                 process_group=0,  # Ctrl-C is for the parent; and all of it can be killed
             )
         except OSError as error:
             raise InputError(
-                f"cannot start a process in {self.setting.folder!r}: {error}"
+                f"cannot start a process in {self.prepared.folder!r}: {error}"
             ) from error
         finally:
             theirs.close()  # so that its death is seen as the end of the pipe
         if self.closed:  # by another thread, which saw no process yet
             _kill(self._process)
         with contextlib.suppress(OSError):  # it died already, as _receive will find
-            self._pipe.send((self.setting, strict))
+            self._pipe.send((self.prepared, strict))
 
     def _receive(self, deadline: float) -> Any:
-        """What the process sends, or _Gone when it died or took too long."""
+        """What the process sends, or _ProcessGone when it died or took too long."""
         try:
             if self._pipe.poll(deadline):
                 return self._pipe.recv()
         except BlockingIOError:  # it began to answer
-            raise _Gone(f"stuck in its answer for {STUCK_S} s, killed") from None
+            raise _ProcessGone(f"stuck in its answer for {STUCK_S} s, killed") from None
         except (EOFError, OSError):
-            raise _Gone(self._end() + self._last_words()) from None
-        raise _Gone(f"no answer within {deadline:g} s, killed")
+            raise _ProcessGone(self._end() + self._last_words()) from None
+        raise _ProcessGone(f"no answer within {deadline:g} s, killed")
 
     def _end(self) -> str:
         """How the process ended, in words."""
@@ -210,7 +210,7 @@ class Worker:
         self._folder.cleanup()
 
 
-class _Gone(Exception):
+class _ProcessGone(Exception):
     """The process died or was killed; the message says how."""
 
 
@@ -234,14 +234,14 @@ _WORKERS: set[Worker] = set()
 _THREAD = threading.local()
 
 
-def play(setting: Setting, jobs: Sequence[Job]) -> list[Answer]:
+def play(prepared: PreparedBatch, jobs: Sequence[Job]) -> list[Answer]:
     """Play jobs in a process of this thread's own: what every executor is given to do.
 
     Several jobs share one simulation. What they find there is played again, each in a simulation
     of its own, and that is what counts.
     """
-    worker = _own_worker(setting)
-    if setting.plan.reset == "fresh":
+    worker = _own_worker(prepared)
+    if prepared.plan.reset == "fresh":
         return [worker.play(job) for job in jobs]
     return [
         worker.play(job) if is_test(answer[0].row) else answer
@@ -259,9 +259,9 @@ def search(worker: Worker, jobs: Sequence[Job]) -> list[Answer]:
     return answers
 
 
-def rehearse(setting: Setting) -> None:
-    """Start this thread's process; raises InputError when it refuses the setting."""
-    _own_worker(setting).start()
+def try_out(prepared: PreparedBatch) -> None:
+    """Start this thread's process; raises InputError when it refuses the batch."""
+    _own_worker(prepared).start()
 
 
 def close_all() -> None:
@@ -270,11 +270,11 @@ def close_all() -> None:
         worker.close()
 
 
-def _own_worker(setting: Setting) -> Worker:
-    """This thread's worker, a new one for a new setting."""
+def _own_worker(prepared: PreparedBatch) -> Worker:
+    """This thread's worker, a new one for another batch."""
     worker: Worker | None = getattr(_THREAD, "worker", None)
-    if worker is None or worker.closed or worker.setting.key != setting.key:
+    if worker is None or worker.closed or worker.prepared.key != prepared.key:
         if worker is not None:
             worker.close()
-        worker = _THREAD.worker = Worker(setting)
+        worker = _THREAD.worker = Worker(prepared)
     return worker

@@ -14,7 +14,7 @@ import sys
 from multiprocessing.connection import Connection
 
 from cavsumo.batch.jobs import Job
-from cavsumo.batch.prepared import Setting
+from cavsumo.batch.prepared import PreparedBatch
 from cavsumo.errors import CavsumoError
 from cavsumo.model.processes import leash
 
@@ -37,22 +37,22 @@ def main(pipe_fd: int, log_fd: int, parent: int) -> None:
     os._exit(0)  # taking Python and its libraries apart takes longer than an episode
 
 
-def _serve(pipe: Connection, setting: Setting, strict: bool) -> None:
+def _serve(pipe: Connection, prepared: PreparedBatch, strict: bool) -> None:
     """Rehearse once, then play; a refusal is sent instead of None."""
-    from cavsumo.batch.episode_runner import Theatre
+    from cavsumo.batch.episode_runner import EpisodeRunner
 
     with contextlib.ExitStack() as stack:
         try:
-            setting.check_here()
-            theatre = stack.enter_context(Theatre(setting.plan, setting.site))
-            theatre.rehearse(strict=strict)
+            prepared.check_here()
+            runner = stack.enter_context(EpisodeRunner(prepared.plan, prepared.site))
+            runner.try_out(strict=strict)
         except (CavsumoError, OSError) as error:
             pipe.send(str(error))
             return
         pipe.send(None)
 
         def alarm() -> None:
-            signal.setitimer(signal.ITIMER_REAL, setting.plan.deadline_s + ALARM_AFTER_S)
+            signal.setitimer(signal.ITIMER_REAL, prepared.plan.deadline_s + ALARM_AFTER_S)
 
         def beat() -> None:
             alarm()
@@ -61,7 +61,7 @@ def _serve(pipe: Connection, setting: Setting, strict: bool) -> None:
         while pipe.poll(IDLE_S):
             job: Job = pipe.recv()
             alarm()
-            answer = theatre.play(job, beat)
+            answer = runner.play(job, beat)
             signal.setitimer(signal.ITIMER_REAL, 0.0)
             pipe.send(answer)
         pipe.send(GOODBYE)

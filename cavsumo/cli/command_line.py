@@ -53,7 +53,7 @@ def _joined(words: Sequence[str]) -> list[str]:
     return joined
 
 
-class _Parser(argparse.ArgumentParser):
+class _OptionParser(argparse.ArgumentParser):
     """argparse with our way of saying no: one sentence, exit status 2."""
 
     def error(self, message: str) -> NoReturn:
@@ -61,7 +61,7 @@ class _Parser(argparse.ArgumentParser):
 
 
 def _parser() -> argparse.ArgumentParser:
-    parser = _Parser(
+    parser = _OptionParser(
         prog="cavsumo",
         description="Which tests make this vehicle fail at this junction, are they fair, and how "
         "sure are we? Generates tests for autonomous vehicles in SUMO.",

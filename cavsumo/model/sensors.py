@@ -4,7 +4,7 @@ An observer is the ego, or a tester agent with all its bodies. It knows itself e
 Of everybody else it has *measurements*. The one of a timestep holds
 
 * who is within ``range_m`` of one of its eyes, the centres of its own bodies, centre to centre, and
-  is seen from that eye past the vehicles of others (``sight``), if ``occlusion`` is on;
+  is seen from that eye past the vehicles of others (``occlusion``), if ``occlusion`` is on;
 * for each of them x + N(0, position_noise_m), y + N(0, position_noise_m), v + N(0, speed_noise_mps)
   and o + N(0, heading_noise_rad): independent of each other, of the body and of the timestep. A
   speed that is not negative stays so, orientations are wrapped;

@@ -70,7 +70,7 @@ class Junction:
 
 
 @dataclass(frozen=True)
-class Ground:
+class InspectedNetwork:
     """What every look at a junction needs.
 
     Attributes:
@@ -90,14 +90,16 @@ class Ground:
     ways: WaysAcross = field(default_factory=dict)
 
 
-def ground(network: Network, half_m: float) -> Ground:
+def ground(network: Network, half_m: float) -> InspectedNetwork:
     """Prepare a network for a look at its junctions; ValueError for lanes without a shape."""
     lanes = [(str(edge.getID()), edge.getLanes()[0]) for edge in network.crossings()]
     lines = shapely.STRtree([LineString(lane_shape(lane)) for _, lane in lanes])
-    return Ground(network, network.roads(), half_m, tuple(name for name, _ in lanes), lines)
+    return InspectedNetwork(
+        network, network.roads(), half_m, tuple(name for name, _ in lanes), lines
+    )
 
 
-def best_junctions(here: Ground, top: int) -> list[Junction]:
+def best_junctions(here: InspectedNetwork, top: int) -> list[Junction]:
     """The junctions best worth testing, those where testers can meet the ego before the others.
 
     The first is the one that ``cavsumo run`` chooses.
@@ -117,7 +119,7 @@ def best_junctions(here: Ground, top: int) -> list[Junction]:
     return [junction(here, node) for node in nodes]
 
 
-def junction(here: Ground, node: Any) -> Junction:
+def junction(here: InspectedNetwork, node: Any) -> Junction:
     """A junction with all ways through it; those where testers meet the ego come first."""
     network = here.network
     x, y = (float(value) for value in node.getCoord()[:2])
@@ -138,7 +140,7 @@ def junction(here: Ground, node: Any) -> Junction:
     )
 
 
-def _way(here: Ground, movement: Movement, route: EgoRoute) -> Way:
+def _way(here: InspectedNetwork, movement: Movement, route: EgoRoute) -> Way:
     """A movement with its route and whom it meets."""
     met = here.lines.query(LineString(route.path.points), "intersects").tolist()
     return Way(
@@ -152,7 +154,7 @@ def _way(here: Ground, movement: Movement, route: EgoRoute) -> Way:
     )
 
 
-def _areas(here: Ground, route: EgoRoute) -> tuple[StartingArea, ...]:
+def _areas(here: InspectedNetwork, route: EgoRoute) -> tuple[StartingArea, ...]:
     """Where testers start that meet a route, none where there is no pavement."""
     try:
         return starting_areas(here.network, here.roads, route.path, here.ways)

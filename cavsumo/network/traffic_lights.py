@@ -55,7 +55,7 @@ class LightStart:
 
 
 @dataclass(frozen=True)
-class Approach:
+class LightOnRoute:
     """The ego's way to the first traffic light on its route.
 
     Attributes:
@@ -106,14 +106,14 @@ def lights_along(network: Network, route: EgoRoute) -> tuple[Light, ...]:
     )
 
 
-def first_light(network: Network, route: EgoRoute, signal: Signal) -> Approach:
+def first_light(network: Network, route: EgoRoute, signal: Signal) -> LightOnRoute:
     """The way to the first traffic light on the ego's route; raises NetworkError for none."""
     legs: list[tuple[float, float]] = []
     for lane, link in _links(network, route):
         legs.append((float(lane.getLength()), float(lane.getSpeed())))
         if link is not None and link.getTLSID():
             legs[0] = (max(0.1, legs[0][0] - route.depart_m), legs[0][1])
-            return Approach(str(link.getTLSID()), int(link.getTLLinkIndex()), tuple(legs))
+            return LightOnRoute(str(link.getTLSID()), int(link.getTLLinkIndex()), tuple(legs))
     raise NetworkError(f"{network.file}: signal {signal}: the ego's route has no traffic light")
 
 

@@ -25,8 +25,8 @@ from cavsumo.model.scene import Scene
 from cavsumo.model.snapshot import BodyState, Snapshot
 from cavsumo.model.zone_presence import is_vehicle, ran_into
 from cavsumo.simulation.avoidability_guess import foreseen
-from cavsumo.simulation.loop import Episode, Performance
-from cavsumo.simulation.setup import Stage
+from cavsumo.simulation.loop import Episode, EpisodeLoop
+from cavsumo.simulation.setup import Setup
 
 MOST_RERUNS = 6  # a handful; a search that needs more says how far it came
 STRIDES = (1, 4)  # how far from the last answer the next one is asked for, then halfway [timesteps]
@@ -36,7 +36,7 @@ NOT_MONOTONE = "not monotone: a later takeover avoided it and an earlier one did
 
 
 @dataclass(frozen=True)
-class Verdict:
+class Avoidability:
     """Whether a reference driver would have avoided a violation.
 
     Attributes:
@@ -52,7 +52,7 @@ class Verdict:
     note: str = ""
 
 
-class Watch(Assertion):
+class ContactWatch(Assertion):
     """What a rerun is about: the moving ego touches nobody.
 
     A body that touches the standing ego, or a vehicle that runs into the side or rear of a moving
@@ -77,18 +77,18 @@ class Diverged(CavsumoError):
 
 
 @dataclass(frozen=True)
-class Retrial:
+class AvoidabilityCheck:
     """An episode that ended in a violation, to be played again with other drivers.
 
     Attributes:
-        stage, agents, seed: with which it was played.
+        setup, agents, seed: with which it was played.
         record: whether everybody was shown in its snapshots.
         episode: what happened; its frames and actions were kept.
         beat: called before each rerun, so that whoever waits knows that it goes on.
         broken: the assertion that was violated.
     """
 
-    stage: Stage
+    setup: Setup
     agents: Sequence[Agent]
     seed: int
     record: bool
@@ -98,7 +98,7 @@ class Retrial:
 
     def __post_init__(self) -> None:
         said = self.episode.judgement
-        broken = next(a for a in self.stage.assertions if a.judgement is said)
+        broken = next(a for a in self.setup.assertions if a.judgement is said)
         object.__setattr__(self, "broken", broken)
 
     @property
@@ -106,19 +106,21 @@ class Retrial:
         """The timestep of the violation."""
         time = self.episode.judgement.violation_time
         assert time is not None
-        return min(round(time / self.stage.world.dt), len(self.episode.frames) - 1)
+        return min(round(time / self.setup.world.dt), len(self.episode.frames) - 1)
 
-    def judged(self, reference: Reference) -> Verdict:
+    def judged(self, reference: Reference) -> Avoidability:
         """Whether a reference driver would have avoided it, and until when."""
         try:
             return self._judged(reference)
         except CavsumoError as error:
-            return Verdict(None, note=f"not judged: {error}")
+            return Avoidability(None, note=f"not judged: {error}")
 
-    def _judged(self, reference: Reference) -> Verdict:
+    def _judged(self, reference: Reference) -> Avoidability:
         end, frames = self.end, self.episode.frames
         if frames[end].ego.v <= STANDING_MPS:
-            return Verdict(None, note="not judged: the ego stood, and the references only brake")
+            return Avoidability(
+                None, note="not judged: the ego stood, and the references only brake"
+            )
         perceived, guess = self._risk(reference)
         outcomes: dict[int, bool] = {end: False}
 
@@ -137,15 +139,15 @@ class Retrial:
             )
         note = "; ".join(notes)
         if low < 0:
-            return Verdict(avoidable, note=note)
-        return Verdict(avoidable, frames[low].time, frames[end].time - frames[low].time, note)
+            return Avoidability(avoidable, note=note)
+        return Avoidability(avoidable, frames[low].time, frames[end].time - frames[low].time, note)
 
     def _risk(self, reference: Reference) -> tuple[int, int]:
         """When the reference perceives the risk, and a guess of the last chance, as timesteps.
 
         Without a body to look at it is the trigger of the assertion.
         """
-        dt, end = self.stage.world.dt, self.end
+        dt, end = self.setup.world.dt, self.end
         bodies = self._bodies()
         if bodies is None:
             return self._trigger(), end - self._delay(reference)
@@ -160,14 +162,14 @@ class Retrial:
 
     def _delay(self, reference: Reference) -> int:
         """How many timesteps it takes a reference to change the course of things a little."""
-        dt, kind = self.stage.world.dt, self.stage.ego.kind
+        dt, kind = self.setup.world.dt, self.setup.ego.kind
         steps = range(self.end)
         return next((i for i in steps if reference.speed_lost(i * dt, kind) >= NOTABLE_MPS), 1)
 
     def _trigger(self) -> int:
         """The timestep at which the precondition began to hold."""
         time = self.episode.judgement.trigger_time or 0.0
-        return min(round(time / self.stage.world.dt), self.end)
+        return min(round(time / self.setup.world.dt), self.end)
 
     def _bodies(self) -> list[BodyState | None] | None:
         """The body of the violation at each timestep up to it; None when none is involved."""
@@ -179,8 +181,8 @@ class Retrial:
 
     def _scene(self) -> Scene:
         """What the encounters are measured in: paths and roads of the site."""
-        world = self.stage.world
-        return self.stage.site.scene(world.dt, world.ego_body, self.stage.bodies, (), self.seed)
+        world = self.setup.world
+        return self.setup.site.scene(world.dt, world.ego_body, self.setup.bodies, (), self.seed)
 
     def _avoided(self, reference: Reference, step: int) -> bool:
         """Whether the ego that is taken over at a timestep violates nothing and hits nobody.
@@ -189,12 +191,12 @@ class Retrial:
         the end of the episode.
         """
         self.beat()
-        episode, broken, watch = self.episode, self.broken, Watch()
+        episode, broken, watch = self.episode, self.broken, ContactWatch()
         # Whoever is left out of the rerun saw what the first episode showed.
-        record = self.record or any(a.sees_background for a in self.stage.assertions)
-        ego = Takeover(self.stage.ego, reference, step, drives=episode.drives)
-        stage = dataclasses.replace(self.stage, ego=ego, assertions=(broken, watch))
-        rerun = Performance(stage, self._playbacks(), self.seed, record=record)
+        record = self.record or any(a.sees_background for a in self.setup.assertions)
+        ego = Takeover(self.setup.ego, reference, step, drives=episode.drives)
+        setup = dataclasses.replace(self.setup, ego=ego, assertions=(broken, watch))
+        rerun = EpisodeLoop(setup, self._playbacks(), self.seed, record=record)
         by_contact = episode.judgement.impact_speed is not None
         while True:
             now = rerun.snapshot

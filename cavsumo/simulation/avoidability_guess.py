@@ -29,7 +29,7 @@ def foreseen(
         bodies: the body touched, at each of them.
         dt: length of a timestep [s].
     """
-    way = Way([frame.ego for frame in frames])
+    way = DrivenWay([frame.ego for frame in frames])
 
     def fails(step: int) -> bool:
         return _touches(way, bodies, step, reference, dt)
@@ -37,7 +37,7 @@ def foreseen(
     return bisect_left(range(len(frames)), True, key=fails) - 1
 
 
-class Way:
+class DrivenWay:
     """The way that the ego drove, by arc length; straight on behind its end.
 
     Attributes:
@@ -65,7 +65,7 @@ class Way:
 
 
 def _touches(
-    way: Way, bodies: Sequence[BodyState], step: int, reference: Reference, dt: float
+    way: DrivenWay, bodies: Sequence[BodyState], step: int, reference: Reference, dt: float
 ) -> bool:
     """Whether the ego, taken over at a timestep, touches the body before it stands."""
     ego, before = way.states[step], way.states[max(0, step - 1)]

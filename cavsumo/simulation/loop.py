@@ -16,9 +16,9 @@ from cavsumo.agents.base import Agent, Forecast
 from cavsumo.assertions.base import INVALID, VIOLATED, Assertion, Judgement, weightiest
 from cavsumo.assertions.blame import blamed
 from cavsumo.assertions.contacts import ContactMonitor
-from cavsumo.assertions.criticality_monitor import Course
-from cavsumo.assertions.naturalness import Conduct
-from cavsumo.assertions.validity import Breach, Umpire
+from cavsumo.assertions.criticality_monitor import CriticalityMonitor
+from cavsumo.assertions.naturalness import Naturalness
+from cavsumo.assertions.validity import Breach, ValidityMonitor
 from cavsumo.egos.base import Drive, Ego
 from cavsumo.errors import AgentError
 from cavsumo.model.bodies import Action, Kind
@@ -29,8 +29,8 @@ from cavsumo.model.scene import Scene
 from cavsumo.model.seeds import starts_generator
 from cavsumo.model.sensors import Senses
 from cavsumo.model.snapshot import BodyState, Snapshot
-from cavsumo.simulation.rewards import Feedback, Ledger
-from cavsumo.simulation.setup import Stage
+from cavsumo.simulation.rewards import Feedback, RewardMonitor
+from cavsumo.simulation.setup import Setup
 
 # An episode whose verdict is open at the horizon may run on for this long [s].
 OVERTIME_S = 15.0
@@ -54,12 +54,12 @@ class Episode:
     time: float = 0.0
     max_decel: float = 0.0
     contacts: ContactMonitor = field(default_factory=ContactMonitor)
-    conduct: Conduct = field(default_factory=Conduct)
+    naturalness: Naturalness = field(default_factory=Naturalness)
     breach: Breach | None = None
     invalid: bool = False
     blame: str = ""
     rms_acceleration: float = 0.0
-    course: Course = field(default_factory=Course)
+    criticality: CriticalityMonitor = field(default_factory=CriticalityMonitor)
     cost: float = 0.0
     reward: float = 0.0
     sumo_collisions: frozenset[tuple[str, str]] = frozenset()
@@ -76,7 +76,7 @@ class Episode:
         return INVALID if self.invalid else self.judgement.verdict
 
 
-class Performance:
+class EpisodeLoop:
     """One episode under way (Algorithm 1).
 
     Args:
@@ -95,7 +95,7 @@ class Performance:
 
     def __init__(
         self,
-        stage: Stage,
+        setup: Setup,
         agents: Sequence[Agent],
         seed: int,
         *,
@@ -103,48 +103,48 @@ class Performance:
         keep: bool = False,
         simulation: Simulation = "own",
     ) -> None:
-        self._stage, self._agents, self._record = stage, agents, record or keep
-        self.scene, self.snapshot, self._senses = _reset(stage, agents, seed, record, simulation)
+        self._setup, self._agents, self._record = setup, agents, record or keep
+        self.scene, self.snapshot, self._senses = _reset(setup, agents, seed, record, simulation)
         self._show(self.snapshot)
-        self._ledger = Ledger(self.scene, stage.teams)
+        self._rewards = RewardMonitor(self.scene, setup.teams)
         self._episode = Episode(Judgement(""))
         self._episode.forecast = _foretold(agents, self.agent_views)
-        self._umpire = Umpire(self.scene)
+        self._validity = ValidityMonitor(self.scene)
         self._history: list[Snapshot] = []  # what the blame is found from
         self._learners = any(type(a).process_feedback is not Agent.process_feedback for a in agents)
         self._observe(self.snapshot)
-        self._end(_over(stage, self.snapshot))
+        self._end(_over(setup, self.snapshot))
 
     def step(self) -> Feedback | None:
         """One timestep: everybody chooses, the world moves on; what the agents earned by it.
 
         None once their game is over, although the episode may go on until all is decided.
         """
-        stage, episode, snapshot, agents = self._stage, self._episode, self.snapshot, self._agents
+        setup, episode, snapshot, agents = self._setup, self._episode, self.snapshot, self._agents
         scene, views = self.scene, self.agent_views
         actions = [a.choose_action(view) for a, view in zip(agents, views, strict=True)]
-        states = _moved(snapshot.testers, stage.teams, actions, scene.dt)
-        command = stage.ego.act(self.ego_view)
+        states = _moved(snapshot.testers, setup.teams, actions, scene.dt)
+        command = setup.ego.act(self.ego_view)
         episode.drives = isinstance(command, Drive)
         if self._record:
             episode.actions.append(actions)
-        successor = stage.world.step(states, command)
+        successor = setup.world.step(states, command)
         if successor is None or (episode.drives and _at_end(scene, successor)):
             self._end(True)
-            rewards = self._ledger.lost()
+            rewards = self._rewards.lost()
             _feed_back(agents, views, actions, rewards, views)
             return rewards
         braking = (snapshot.ego.v - successor.ego.v) / scene.dt
         if braking > episode.max_decel:
             episode.max_decel = braking
         self._observe(successor)
-        judgements = [a.judgement for a in stage.assertions]
-        rewards = self._ledger.rewards(successor, judgements, self._umpire.breaches)
+        judgements = [a.judgement for a in setup.assertions]
+        rewards = self._rewards.rewards(successor, judgements, self._validity.breaches)
         self._show(successor)
         if self._learners:
             _feed_back(agents, views, actions, rewards, self.agent_views)
         self.snapshot = successor
-        self._end(_over(stage, successor))
+        self._end(_over(setup, successor))
         return rewards
 
     @property
@@ -155,19 +155,21 @@ class Performance:
     @property
     def judgement(self) -> Judgement:
         """The most serious of what the assertions say so far."""
-        return weightiest(self._stage.assertions)
+        return weightiest(self._setup.assertions)
 
     @property
     def outcome(self) -> str:
         """What came out so far."""
-        return INVALID if self._umpire.spoils(self.judgement) else self.judgement.verdict
+        return INVALID if self._validity.spoils(self.judgement) else self.judgement.verdict
 
     def finished(self) -> Episode:
         """What happened, or what happened so far."""
-        episode = _finished(self._stage, self._episode, self.snapshot, self._ledger)
-        episode.rms_acceleration = episode.conduct.rms_acceleration(episode.steps, self.scene.dt)
-        spoilt = self._umpire.spoils(episode.judgement)
-        episode.invalid, episode.breach = spoilt is not None, spoilt or self._umpire.first
+        episode = _finished(self._setup, self._episode, self.snapshot, self._rewards)
+        episode.rms_acceleration = episode.naturalness.rms_acceleration(
+            episode.steps, self.scene.dt
+        )
+        spoilt = self._validity.spoils(episode.judgement)
+        episode.invalid, episode.breach = spoilt is not None, spoilt or self._validity.first
         if episode.outcome == VIOLATED:
             episode.blame = blamed(self.scene, self._history, episode.judgement)
         return episode
@@ -177,12 +179,12 @@ class Performance:
 
         The testers are watched until an assertion is violated: what follows changes no verdict.
         """
-        episode, assertions = self._episode, self._stage.assertions
+        episode, assertions = self._episode, self._setup.assertions
         contacts = episode.contacts.observe(snapshot)
         if not any(a.judgement.verdict == VIOLATED for a in assertions):
-            self._umpire.observe(snapshot, episode.contacts.pairs)
-        episode.conduct.observe(snapshot)
-        episode.course.observe(snapshot, contacts)
+            self._validity.observe(snapshot, episode.contacts.pairs)
+        episode.naturalness.observe(snapshot)
+        episode.criticality.observe(snapshot, contacts)
         for assertion in assertions:
             assertion.observe(snapshot, contacts)
         self._history.append(snapshot)
@@ -193,7 +195,7 @@ class Performance:
         """Note whether the episode is over; if so, the assertions are told."""
         self.over = over
         if over:
-            for assertion in self._stage.assertions:
+            for assertion in self._setup.assertions:
                 assertion.conclude()
 
     def _show(self, snapshot: Snapshot) -> None:
@@ -205,7 +207,7 @@ class Performance:
 
 
 def play(
-    stage: Stage,
+    setup: Setup,
     agents: Sequence[Agent],
     seed: int,
     *,
@@ -213,40 +215,40 @@ def play(
     keep: bool = False,
     simulation: Simulation = "own",
 ) -> Episode:
-    """A whole episode; the arguments are those of ``Performance``."""
-    performance = Performance(stage, agents, seed, record=record, keep=keep, simulation=simulation)
-    while not performance.over:
-        performance.step()
-    return performance.finished()
+    """A whole episode; the arguments are those of ``EpisodeLoop``."""
+    loop = EpisodeLoop(setup, agents, seed, record=record, keep=keep, simulation=simulation)
+    while not loop.over:
+        loop.step()
+    return loop.finished()
 
 
 def _reset(
-    stage: Stage, agents: Sequence[Agent], seed: int, record: bool, simulation: Simulation
+    setup: Setup, agents: Sequence[Agent], seed: int, record: bool, simulation: Simulation
 ) -> tuple[Scene, Snapshot, Senses | None]:
     """Draw the starts and begin an episode; one generator for each who draws."""
     streams = np.random.SeedSequence(seed)
     _, electing, *rest = map(np.random.default_rng, streams.spawn(2 + len(agents)))
-    placing = starts_generator(seed if stage.starts_seed is None else stage.starts_seed)
-    kinds = [body.kind for body in stage.bodies]
-    ego = stage.world.ego_body
-    starts = stage.site.draw(kinds, ego.kind, stage.start_speed, placing)
-    site = stage.site
-    scene = site.scene(stage.world.dt, ego, stage.bodies, starts, seed)
-    scene = dataclasses.replace(scene, horizon=stage.horizon)
-    watching: list[Ego | Agent | Assertion] = [stage.ego, *agents, *stage.assertions]
+    placing = starts_generator(seed if setup.starts_seed is None else setup.starts_seed)
+    kinds = [body.kind for body in setup.bodies]
+    ego = setup.world.ego_body
+    starts = setup.site.draw(kinds, ego.kind, setup.start_speed, placing)
+    site = setup.site
+    scene = site.scene(setup.world.dt, ego, setup.bodies, starts, seed)
+    scene = dataclasses.replace(scene, horizon=setup.horizon)
+    watching: list[Ego | Agent | Assertion] = [setup.ego, *agents, *setup.assertions]
     # Vehicles keep their distance to whoever is ahead of them, so they see everybody.
     driving = any(start.approach for start in starts)
-    senses = _senses(stage, scene, streams)
+    senses = _senses(setup, scene, streams)
     everything = record or driving or senses is not None
     everything = everything or any(who.sees_background for who in watching)
-    snapshot = stage.world.reset(
-        seed, _states(stage, starts), starts, everything=everything, simulation=simulation
+    snapshot = setup.world.reset(
+        seed, _states(setup, starts), starts, everything=everything, simulation=simulation
     )
-    for agent, team, rng in zip(agents, stage.teams, rest, strict=True):
+    for agent, team, rng in zip(agents, setup.teams, rest, strict=True):
         agent.reset(scene, team, rng)
     type(agents[0]).coordinate(agents, electing)
-    stage.ego.reset(scene)
-    for assertion in stage.assertions:
+    setup.ego.reset(scene)
+    for assertion in setup.assertions:
         assertion.reset(scene)
     return scene, snapshot, senses
 
@@ -257,28 +259,28 @@ def _foretold(agents: Sequence[Agent], views: Sequence[Snapshot]) -> Forecast | 
     return max((one for one in said if one is not None), default=None, key=Forecast.rank)
 
 
-def _senses(stage: Stage, scene: Scene, streams: np.random.SeedSequence) -> Senses | None:
+def _senses(setup: Setup, scene: Scene, streams: np.random.SeedSequence) -> Senses | None:
     """The observers of an episode, None with full observability.
 
     Their generators come after all others, which are the same with sensors and without.
     """
-    if not (stage.ego_sensor or stage.tester_sensor):
+    if not (setup.ego_sensor or setup.tester_sensor):
         return None
-    seeds = streams.spawn(1 + len(stage.teams))
-    return Senses(scene, stage.ego_sensor, stage.tester_sensor, stage.teams, seeds)
+    seeds = streams.spawn(1 + len(setup.teams))
+    return Senses(scene, setup.ego_sensor, setup.tester_sensor, setup.teams, seeds)
 
 
-def _states(stage: Stage, starts: Sequence[Start]) -> list[BodyState]:
+def _states(setup: Setup, starts: Sequence[Start]) -> list[BodyState]:
     """The testers' first states."""
 
     def speed(kind: Kind, start: Start) -> float:
         if start.v is not None:
             return start.v
-        return kind.v_max if stage.start_speed is None else min(kind.v_max, stage.start_speed)
+        return kind.v_max if setup.start_speed is None else min(kind.v_max, setup.start_speed)
 
     return [
         BodyState(body, start.x, start.y, speed(body.kind, start), start.o)
-        for body, start in zip(stage.bodies, starts, strict=True)
+        for body, start in zip(setup.bodies, starts, strict=True)
     ]
 
 
@@ -334,17 +336,17 @@ def _feed_back(
         agent.process_feedback(snapshot, action, reward, successor, rewards[1])
 
 
-def _over(stage: Stage, snapshot: Snapshot) -> bool:
+def _over(setup: Setup, snapshot: Snapshot) -> bool:
     """The terminator psi: every assertion decided, or the horizon with none pending."""
-    for assertion in stage.assertions:
+    for assertion in setup.assertions:
         if not assertion.decided:
             break
     else:
         return True
-    left = stage.horizon - snapshot.time
+    left = setup.horizon - snapshot.time
     if left > 1e-9:
         return False
-    return left < -OVERTIME_S or not any(a.pending for a in stage.assertions)
+    return left < -OVERTIME_S or not any(a.pending for a in setup.assertions)
 
 
 def _at_end(scene: Scene, snapshot: Snapshot) -> bool:
@@ -353,13 +355,15 @@ def _at_end(scene: Scene, snapshot: Snapshot) -> bool:
     return path.project(ego.x, ego.y).along >= path.length - ego.body.kind.length / 2
 
 
-def _finished(stage: Stage, episode: Episode, snapshot: Snapshot, ledger: Ledger) -> Episode:
+def _finished(
+    setup: Setup, episode: Episode, snapshot: Snapshot, rewards: RewardMonitor
+) -> Episode:
     """The episode with its totals."""
-    episode.judgement = weightiest(stage.assertions)
-    episode.verdicts = {a.name: a.judgement.verdict for a in stage.assertions}
+    episode.judgement = weightiest(setup.assertions)
+    episode.verdicts = {a.name: a.judgement.verdict for a in setup.assertions}
     episode.steps, episode.time = snapshot.step, snapshot.time
-    episode.cost, episode.reward = ledger.cost, ledger.total
-    world = stage.world
+    episode.cost, episode.reward = rewards.cost, rewards.total
+    world = setup.world
     episode.sumo_collisions = frozenset(world.collisions)
     episode.teleports, episode.emergency_stops = world.teleports, world.emergency_stops
     assert math.isfinite(episode.reward)

@@ -19,7 +19,7 @@ ROAD_COST = 1.0  # per second that a body's centre is on the carriageway
 Feedback = tuple[list[float], bool]  # each agent's reward for a timestep, and whether the game ends
 
 
-class Ledger:
+class RewardMonitor:
     """The account of one episode.
 
     Attributes:

@@ -17,7 +17,7 @@ from cavsumo.sumo.world import World
 
 
 @dataclass(frozen=True)
-class Stage:
+class Setup:
     """All that episodes of one scenario share.
 
     Attributes:
@@ -55,10 +55,10 @@ class Stage:
         self.world.close()
 
 
-def set_stage(scenario: Scenario, site: Site, ego: Ego | None = None) -> Stage:
-    """A scenario's stage, with an ego of its own unless one is given."""
+def make_setup(scenario: Scenario, site: Site, ego: Ego | None = None) -> Setup:
+    """The setup of a scenario, with an ego of its own unless one is given."""
     ego = ego or make_ego(scenario.ego, scenario.ego_params)
-    return Stage(
+    return Setup(
         world=World(scenario, site, ego),
         site=site,
         ego=ego,

@@ -27,7 +27,7 @@ LETTERS = "rrruGGGGgy"  # shown for 3 s each
 
 
 @dataclass(frozen=True)
-class Ground:
+class ScriptNetwork:
     """A network on which scripts are played, and the timestep [s]."""
 
     site: Site
@@ -66,9 +66,9 @@ class Script:
     held: bool = False
 
 
-def ground(net: Path, ego: Kind, dt: float = DT) -> Ground:
+def ground(net: Path, ego: Kind, dt: float = DT) -> ScriptNetwork:
     """The ground that a network offers; raises InputError as ``cavsumo run`` does."""
-    return Ground(derive_site(net, (), None, ego), dt)
+    return ScriptNetwork(derive_site(net, (), None, ego), dt)
 
 
 # Scripts
@@ -110,7 +110,7 @@ ODD, LONG = Script(50, oddities), Script(6000, nobody, held=True)
 
 
 def drive(
-    ego: Ego, ground: Ground, script: Script, seed: int
+    ego: Ego, ground: ScriptNetwork, script: Script, seed: int
 ) -> Iterator[tuple[Snapshot, Command]]:
     """Play a script to an ego: each snapshot with its answer, until it has arrived.
 

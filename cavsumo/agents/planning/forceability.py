@@ -20,7 +20,7 @@ LEAST_MPS = 0.1  # an ego slower than that is taken as standing: it has no zones
 ROOM_M = 0.2  # the table is left alone where rounding up could lead off it
 
 
-class Outlook:
+class Forceability:
     """Judges relative states of one body; subclasses say what the ego may do.
 
     Args:
@@ -74,7 +74,7 @@ class Outlook:
         return (top - v) / a + (way - gaining) / top, until, top
 
 
-class Constant(Outlook):
+class ConstantSpeed(Forceability):
     """Against an ego that keeps its speed, whatever that is."""
 
     def _on_table(self, here: Relative, late: float) -> tuple[float, float, float, float] | None:
@@ -85,7 +85,7 @@ class Constant(Outlook):
         return arrives - t - late, 1.0, left, walk
 
 
-class Free(Outlook):
+class Free(Forceability):
     """Against an ego that brakes and accelerates as it likes, but never stops."""
 
     def _on_table(self, here: Relative, late: float) -> tuple[float, float, float, float] | None:

@@ -60,7 +60,7 @@ def acceleration_class(a: float) -> int:
     return bisect.bisect(EDGES_MPS2, a)
 
 
-class Watch:
+class AccelerationReader:
     """Reads an ego's acceleration and its age off successive speeds.
 
     An ego is taken to have chosen its first acceleration as it entered.

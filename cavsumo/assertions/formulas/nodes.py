@@ -73,7 +73,7 @@ class Not:
 
 
 @dataclass(frozen=True, slots=True)
-class Junction:
+class Connective:
     """Two or more joined by ``and`` or ``or``."""
 
     op: Literal["and", "or"]
@@ -122,7 +122,7 @@ class Until:
 
 
 NumberNode: TypeAlias = Number | Signal | Arithmetic | Function
-TruthNode: TypeAlias = Constant | Comparison | Not | Junction | Conditional | Temporal | Until
+TruthNode: TypeAlias = Constant | Comparison | Not | Connective | Conditional | Temporal | Until
 Node: TypeAlias = NumberNode | TruthNode
 
 
@@ -138,7 +138,7 @@ def walk(node: Node) -> Iterator[Node]:
         case Arithmetic() | Comparison() | Conditional() | Until():
             yield from walk(node.left)
             yield from walk(node.right)
-        case Function(of=parts) | Junction(of=parts):
+        case Function(of=parts) | Connective(of=parts):
             for part in parts:
                 yield from walk(part)
         case Not() | Temporal():

@@ -40,10 +40,10 @@ from cavsumo.assertions.formulas.nodes import (
     Arithmetic,
     Comparison,
     Conditional,
+    Connective,
     Constant,
     Function,
     Interval,
-    Junction,
     Not,
     Number,
     NumberNode,
@@ -118,7 +118,7 @@ def _bounds(formula: TruthNode, view: View) -> Bounds:
             return _known(_compared(formula, view))
         case Not(of=of):
             return _bounds(of, view).opposite
-        case Junction(op=op, of=parts):
+        case Connective(op=op, of=parts):
             join = np.minimum if op == "and" else np.maximum
             least, greatest = zip(*(_bounds(part, view) for part in parts), strict=True)
             return Bounds(reduce(join, least), reduce(join, greatest))

@@ -29,10 +29,10 @@ from cavsumo.assertions.formulas.nodes import (
     Arithmetic,
     Comparison,
     Conditional,
+    Connective,
     Constant,
     Function,
     Interval,
-    Junction,
     Node,
     Not,
     Number,
@@ -57,10 +57,10 @@ def parse(text: str, signals: Collection[str], where: str = "formula") -> TruthN
 
     Raises InputError, beginning with ``where`` and the column, for anything else.
     """
-    return _Parser(Text(where, text), signals).whole()
+    return _FormulaParser(Text(where, text), signals).whole()
 
 
-class _Parser:
+class _FormulaParser:
     """A formula half read."""
 
     def __init__(self, text: Text, signals: Collection[str]) -> None:
@@ -156,7 +156,7 @@ class _Parser:
         parts = [self._checked(node, at)]
         while self._take(op):
             parts.append(self._truth(read))
-        return Junction(op, tuple(parts), at)
+        return Connective(op, tuple(parts), at)
 
     def _lasting(self) -> Node:
         at, node = self._word.at, self._single()

@@ -47,7 +47,7 @@ class Guarantee:
 
 
 @dataclass(frozen=True)
-class Certificate:
+class TriggerCertificate:
     """What holds against all egos at once, each of the two bounds with the confidence.
 
     Attributes:
@@ -71,7 +71,7 @@ class Certificate:
 
 def certified(
     ended: Sequence[Ended], egos: Mapping[str, tuple[str, Mapping[str, Any]]], confidence: float
-) -> Certificate:
+) -> TriggerCertificate:
     """The certificate of batches, one for each ego, by its label."""
     level = 1.0 - (1.0 - confidence) / len(ended)
 
@@ -82,7 +82,7 @@ def certified(
         return Guarantee(label, ego, params, found, tests, failures, _alike(one.csv_file))
 
     guarantees = [guarantee(one, label) for one, label in zip(ended, egos, strict=True)]
-    return Certificate(guarantees, confidence)
+    return TriggerCertificate(guarantees, confidence)
 
 
 def _alike(csv_file: Path) -> bool:
@@ -92,7 +92,7 @@ def _alike(csv_file: Path) -> bool:
     return first is not None and all(row == first for row in rows)
 
 
-def as_json(found: Certificate) -> dict[str, Any]:
+def as_json(found: TriggerCertificate) -> dict[str, Any]:
     """The certificate in full precision (docs/guide.md)."""
     return {
         "confidence": found.confidence,
@@ -118,7 +118,7 @@ def as_json(found: Certificate) -> dict[str, Any]:
     }
 
 
-def as_table(found: Certificate) -> Table:
+def as_table(found: TriggerCertificate) -> Table:
     """One line an ego, and the least of all."""
     table = Table(box=None, pad_edge=False, padding=(0, 2, 0, 0))
     table.add_column("ego", overflow="fold")
@@ -148,7 +148,7 @@ def described(label: str, ego: str, params: Mapping[str, Any]) -> str:
     return " ".join((head, *(f"{key}={value}" for key, value in params.items())))
 
 
-def sentences(found: Certificate) -> list[str]:
+def sentences(found: TriggerCertificate) -> list[str]:
     """What the certificate says, and what it does not."""
     many = len(found.guarantees)
     whom = "against this ego" if many == 1 else f"whichever of these {many} egos drives"

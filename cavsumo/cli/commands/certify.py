@@ -15,13 +15,19 @@ from typing import Any
 from rich.console import Console
 
 from cavsumo.agents.policy import policy_file
-from cavsumo.batch.certify.certificate import Certificate, as_json, as_table, certified, sentences
+from cavsumo.batch.certify.certificate import (
+    TriggerCertificate,
+    as_json,
+    as_table,
+    certified,
+    sentences,
+)
 from cavsumo.batch.certify.ego_list import Egos, choices, opponents
 from cavsumo.batch.certify.tested_policy import Subject, of_policy, of_run, settings_of
 from cavsumo.batch.certify.used_seeds import Used, fresh_seed, used
 from cavsumo.batch.executors import Means
-from cavsumo.batch.preflight import Checked, Manner, checked
-from cavsumo.batch.prepared import Setting, prepare
+from cavsumo.batch.preflight import CheckedBatch, Manner, checked
+from cavsumo.batch.prepared import PreparedBatch, prepare
 from cavsumo.batch.replay import Record, recorded, recorded_plan
 from cavsumo.cli.commands.run import exit_status, played
 from cavsumo.egos import make_ego
@@ -37,7 +43,7 @@ WIDTH = 120
 
 
 @dataclass(frozen=True)
-class Order:
+class CertifyOptions:
     """What to certify, against whom, and how to show it.
 
     Attributes:
@@ -76,7 +82,7 @@ class Order:
     as_json: bool = False
 
 
-def certify(order: Order) -> int:
+def certify(order: CertifyOptions) -> int:
     """Play the test and say what holds; everything is checked before anything is written."""
     _check(order)
     means = Means(order.jobs)
@@ -95,7 +101,7 @@ def certify(order: Order) -> int:
     with _output(order) as output:
         batches = [_marked(b, order, subject) for b in checked(parts, output, manner)]
         _check_batches(order, batches, subject, record)
-        _warn(manifest, batches[0].setting, record, seeds, subject)
+        _warn(manifest, batches[0].prepared, record, seeds, subject)
         if not order.quiet:
             print(_first_lines(order, subject, seeds, seed), file=sys.stderr)
         ended, interrupted = played(batches, means, manner)
@@ -110,7 +116,7 @@ def certify(order: Order) -> int:
 # Checked
 
 
-def _check(order: Order) -> None:
+def _check(order: CertifyOptions) -> None:
     """Refuse what can be seen to be wrong at once."""
     if not 0.0 < order.confidence < 1.0:
         raise InputError(f"--confidence: expected a share below 1, got {order.confidence:g}")
@@ -128,7 +134,7 @@ def _check(order: Order) -> None:
 
 
 def _check_batches(
-    order: Order, batches: Sequence[Checked], subject: Subject, record: Record | None
+    order: CertifyOptions, batches: Sequence[CheckedBatch], subject: Subject, record: Record | None
 ) -> None:
     """Refuse to write over what is read, and starts that another ego would change."""
     read = {file.resolve() for file in (order.results, *order.apart)}
@@ -141,19 +147,19 @@ def _check_batches(
     if ours is None:
         ours = _drawn(prepare(record.plan), seed)
     for batch in batches:
-        if _drawn(batch.setting, seed) != list(ours):
+        if _drawn(batch.prepared, seed) != list(ours):
             raise InputError(
                 f"ego {batch.name}: the starts of run {record.run} cannot be kept, because they "
                 "would be drawn otherwise for this ego or on these files; --starts fresh draws anew"
             )
 
 
-def _drawn(setting: Setting, seed: int) -> list[tuple[float, float, float]]:
-    """Where testers start in a setting."""
-    scenario = setting.plan.scenario
+def _drawn(prepared: PreparedBatch, seed: int) -> list[tuple[float, float, float]]:
+    """Where testers start in a prepared batch."""
+    scenario = prepared.plan.scenario
     ego = make_ego(scenario.ego, scenario.ego_params).kind
     kinds = [kind_named(scenario.kind)] * scenario.testers
-    starts = setting.site.draw(kinds, ego, scenario.start_speed, starts_generator(seed))
+    starts = prepared.site.draw(kinds, ego, scenario.start_speed, starts_generator(seed))
     return [(start.x, start.y, start.o) for start in starts]
 
 
@@ -161,7 +167,7 @@ def _drawn(setting: Setting, seed: int) -> list[tuple[float, float, float]]:
 
 
 def _subject(
-    order: Order, plan: BatchPlan, manifest: Mapping[str, Any]
+    order: CertifyOptions, plan: BatchPlan, manifest: Mapping[str, Any]
 ) -> tuple[Subject, Record | None]:
     """The test, and the run that it comes from if it does."""
     if not order.test.isdecimal():
@@ -172,7 +178,7 @@ def _subject(
 
 
 def _parts(
-    order: Order, manifest: Mapping[str, Any], subject: Subject, egos: Egos, seed: int
+    order: CertifyOptions, manifest: Mapping[str, Any], subject: Subject, egos: Egos, seed: int
 ) -> list[Part]:
     """A batch for each ego."""
     try:
@@ -181,14 +187,14 @@ def _parts(
         raise InputError(f"--egos: {error}; LABEL=EGO gives another name") from error
 
 
-def _marked(batch: Checked, order: Order, subject: Subject) -> Checked:
+def _marked(batch: CheckedBatch, order: CertifyOptions, subject: Subject) -> CheckedBatch:
     """A batch whose manifest says what it certifies."""
     mark = {"certifies": {"test": subject.words, "results": str(order.results)}}
     return dataclasses.replace(batch, manifest={**batch.manifest, **mark})
 
 
 @contextlib.contextmanager
-def _output(order: Order) -> Iterator[Path]:
+def _output(order: CertifyOptions) -> Iterator[Path]:
     """Where the results go; without a name for them to where they are soon gone."""
     if order.output is not None:
         yield order.output
@@ -202,13 +208,13 @@ def _output(order: Order) -> Iterator[Path]:
 
 def _warn(
     manifest: Mapping[str, Any],
-    setting: Setting,
+    prepared: PreparedBatch,
     record: Record | None,
     seeds: Used,
     subject: Subject,
 ) -> None:
     """Say on stderr what a reader of the certificate should know."""
-    for part, now in (("versions", setting.versions), ("sha256", setting.checksums)):
+    for part, now in (("versions", prepared.versions), ("sha256", prepared.checksums)):
         was = manifest.get(part) or {}
         for name in sorted(was.keys() & now.keys()):
             if was[name] != now[name]:
@@ -223,7 +229,7 @@ def _warn(
         print(f"cavsumo: {said}", file=sys.stderr)
 
 
-def _first_lines(order: Order, subject: Subject, seeds: Used, seed: int) -> str:
+def _first_lines(order: CertifyOptions, subject: Subject, seeds: Used, seed: int) -> str:
     """What is certified, what is kept and what is drawn."""
     starts = "kept" if subject.starts_seed is not None else "drawn anew"
     files = ", ".join(map(str, seeds.results))
@@ -234,7 +240,9 @@ def _first_lines(order: Order, subject: Subject, seeds: Used, seed: int) -> str:
     )
 
 
-def _show(order: Order, found: Certificate, subject: Subject, seeds: Used, seed: int) -> None:
+def _show(
+    order: CertifyOptions, found: TriggerCertificate, subject: Subject, seeds: Used, seed: int
+) -> None:
     """Print the certificate."""
     if order.as_json:
         facts = {

@@ -65,9 +65,9 @@ def _passed(name: str, check: Callable[[], str], deadline: float) -> bool:
 def _in_sumo(settings: Mapping[str, Any], deadline: float) -> str:
     """The same episode twice, by one process in SUMO."""
     quiet = {**settings, "trace": "none", "reference": "none", "runs": 1, "deadline_s": deadline}
-    setting = prepare(plan_from(quiet, "check-ego"))
-    with Worker(setting) as worker:
-        rows = [worker.play(job(setting.plan, 0))[0].row for _ in range(EPISODES)]
+    prepared = prepare(plan_from(quiet, "check-ego"))
+    with Worker(prepared) as worker:
+        rows = [worker.play(job(prepared.plan, 0))[0].row for _ in range(EPISODES)]
     for row in rows:
         assert row["outcome"] != "error", row["error"]
     for column in (c for c in COLUMNS if c != "wall_s"):

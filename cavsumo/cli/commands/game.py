@@ -35,7 +35,7 @@ SUFFIXES = (".png", ".svg", ".pdf")
 
 
 @dataclasses.dataclass(frozen=True)
-class Order:
+class SolveOptions:
     """What to solve, and how to show it.
 
     Attributes:
@@ -59,7 +59,7 @@ class Order:
     quiet: bool
 
 
-def solve_file(order: Order) -> int:
+def solve_file(order: SolveOptions) -> int:
     """Solve the game in a file and say what was found."""
     if not (math.isfinite(order.precision) and order.precision > 0):
         raise InputError(f"--precision: expected a positive number, got {order.precision:g}")
@@ -82,7 +82,7 @@ def solve_file(order: Order) -> int:
     return _status(order, verdict, solution)
 
 
-def _status(order: Order, verdict: Verdict, solution: Solution | None) -> int:
+def _status(order: SolveOptions, verdict: Verdict, solution: Solution | None) -> int:
     """The exit status; says on stderr when the bounds are wider than asked for."""
     if solution is not None and not solution.precise:
         print(
@@ -94,7 +94,7 @@ def _status(order: Order, verdict: Verdict, solution: Solution | None) -> int:
     return Exit.OK if verdict.solvable else Exit.VIOLATED
 
 
-def _painters(order: Order) -> list[tuple[Any, Path]]:
+def _painters(order: SolveOptions) -> list[tuple[Any, Path]]:
     """The functions that draw, with their files; InputError where that cannot be."""
     wanted = [("--picture", order.picture, "draw_tree")]
     wanted += [("--policy-picture", order.policy_picture, "draw_policy")]
@@ -163,7 +163,7 @@ def _said(doing: str, left: float) -> str:
 # JSON
 
 
-def _json(order: Order, game: Game, verdict: Verdict, solution: Solution | None) -> str:
+def _json(order: SolveOptions, game: Game, verdict: Verdict, solution: Solution | None) -> str:
     """The result as JSON, with stable keys (docs/games.md)."""
     found: dict[str, Any] = {
         "format": FORMAT,
@@ -230,7 +230,7 @@ def _move(game: Game, solution: Solution, state: int) -> Any:
 # Table
 
 
-def _table(order: Order, game: Game, verdict: Verdict, solution: Solution | None) -> str:
+def _table(order: SolveOptions, game: Game, verdict: Verdict, solution: Solution | None) -> str:
     """The result as a text."""
     text = io.StringIO()
     console = Console(width=110, file=text)

@@ -46,7 +46,7 @@ ENDINGS = (".net.xml", ".net.xml.gz")
 
 
 @dataclass(frozen=True)
-class Order:
+class ImportOptions:
     """What to import, and how.
 
     Attributes:
@@ -70,7 +70,7 @@ class Order:
     time_limit_s: float
 
 
-def import_osm(order: Order) -> int:
+def import_osm(order: ImportOptions) -> int:
     """Make the network; nothing is written unless all went well."""
     _check(order)
     box = None if order.bbox is None else parse_box(order.bbox)
@@ -96,7 +96,7 @@ def import_osm(order: Order) -> int:
     return Exit.OK
 
 
-def _check(order: Order) -> None:
+def _check(order: ImportOptions) -> None:
     """Refuse what cannot become a network file, before any work."""
     output = order.output
     if not output.name.endswith(ENDINGS) or output.name in ENDINGS:
@@ -109,7 +109,7 @@ def _check(order: Order) -> None:
     sumo_home()
 
 
-def _options(order: Order, box: Box | None) -> list[str]:
+def _options(order: ImportOptions, box: Box | None) -> list[str]:
     """netconvert's options, apart from the type maps, whose place differs between machines."""
     left_out = {"tls.discard-simple"} if order.keep_pedestrian_signals else set()
     return [
@@ -143,7 +143,7 @@ def _zebra(folder: Path, time_limit_s: float) -> list[str]:
     return said
 
 
-def _with_notice(network: str, order: Order, options: list[str]) -> str:
+def _with_notice(network: str, order: ImportOptions, options: list[str]) -> str:
     """The network with its licence and how it was made, without names of this machine."""
     zebra = f"then netconvert {' '.join(ZEBRA_OPTIONS)}"
     words = [in_comment(order.source.name), *(f"bbox={order.bbox}" for _ in [order.bbox] if _)]
@@ -168,7 +168,7 @@ def _with_notice(network: str, order: Order, options: list[str]) -> str:
     return with_notice(network, head, lines)
 
 
-def _publish(order: Order, network: str, log_text: str, log: Path) -> None:
+def _publish(order: ImportOptions, network: str, log_text: str, log: Path) -> None:
     """Put the network and its log in place, each as a whole."""
     data = network.encode("utf-8")
     if order.output.suffix == ".gz":

@@ -18,7 +18,14 @@ from rich.text import Text
 from cavsumo.egos.base import EGO_KIND
 from cavsumo.errors import Exit, InputError, NetworkError
 from cavsumo.network.facts import Facts, facts
-from cavsumo.network.inspection import Ground, Junction, Way, best_junctions, ground, junction
+from cavsumo.network.inspection import (
+    InspectedNetwork,
+    Junction,
+    Way,
+    best_junctions,
+    ground,
+    junction,
+)
 from cavsumo.network.pedestrian_starts import StartingArea
 from cavsumo.network.reader import read_network
 
@@ -27,7 +34,7 @@ WIDTH = 120
 
 
 @dataclasses.dataclass(frozen=True)
-class Look:
+class InspectOptions:
     """What to look at, and how to show it.
 
     Attributes:
@@ -45,7 +52,7 @@ class Look:
     picture: Path | None
 
 
-def inspect(look: Look) -> int:
+def inspect(look: InspectOptions) -> int:
     """Look at a network and say what is there."""
     if look.top < 1:
         raise InputError(f"--top: expected at least 1, got {look.top}")
@@ -66,7 +73,7 @@ def inspect(look: Look) -> int:
     return Exit.OK
 
 
-def _junctions(here: Ground, look: Look) -> list[Junction]:
+def _junctions(here: InspectedNetwork, look: InspectOptions) -> list[Junction]:
     """The junction asked for, or the best."""
     if look.junction is not None:
         return [junction(here, here.network.junction(look.junction))]
@@ -155,7 +162,7 @@ def _print(text: str) -> None:
     print(text.encode(encoding, "backslashreplace").decode(encoding), end="")
 
 
-def _shown(look: Look, found: Facts, junctions: list[Junction]) -> str:
+def _shown(look: InspectOptions, found: Facts, junctions: list[Junction]) -> str:
     """Facts and junctions as a text."""
     text = io.StringIO()
     console = Console(width=WIDTH, file=text)

@@ -6,7 +6,7 @@ import sys
 from dataclasses import dataclass
 from pathlib import Path
 
-from cavsumo.batch.prepared import Setting, manifest, prepare
+from cavsumo.batch.prepared import PreparedBatch, manifest, prepare
 from cavsumo.batch.replay import Record, compare, located, recorded, recorded_alone, replayed
 from cavsumo.batch.worker import Worker
 from cavsumo.errors import Exit, InputError
@@ -18,7 +18,7 @@ TRACE = ".jsonl"  # how the name of a trace ends
 
 
 @dataclass(frozen=True)
-class Wanted:
+class ReplayOptions:
     """What a replay is asked for.
 
     Attributes:
@@ -44,7 +44,7 @@ class Wanted:
         return bool(self.html or self.fcd or self.gui)
 
 
-def replay(file: Path, wanted: Wanted = Wanted()) -> int:
+def replay(file: Path, wanted: ReplayOptions = ReplayOptions()) -> int:
     """Play an episode again and show it; raises DivergenceError where it first differs."""
     for option, output in (("--html", wanted.html), ("--fcd", wanted.fcd)):
         if output is not None and not output.parent.is_dir():
@@ -54,16 +54,16 @@ def replay(file: Path, wanted: Wanted = Wanted()) -> int:
 
         check_gui(wanted.delay)
     record = _record(file, wanted)
-    setting = prepare(record.plan)
-    trace = _recorded_trace(record) if wanted.recorded else _played(setting, record)
+    prepared = prepare(record.plan)
+    trace = _recorded_trace(record) if wanted.recorded else _played(prepared, record)
     if wanted.shown and trace is None:
         raise InputError(f"replay: run {record.run} ended in an error, there is nothing to show")
     if trace is not None:
-        _show(setting, record, trace, wanted)
+        _show(prepared, record, trace, wanted)
     return Exit.OK
 
 
-def _record(file: Path, wanted: Wanted) -> Record:
+def _record(file: Path, wanted: ReplayOptions) -> Record:
     """The episode that is meant, with its files."""
     if file.suffix == TRACE:
         if wanted.run is not None:
@@ -85,11 +85,11 @@ def _recorded_trace(record: Record) -> Trace:
     return record.trace
 
 
-def _played(setting: Setting, record: Record) -> Trace | None:
+def _played(prepared: PreparedBatch, record: Record) -> Trace | None:
     """The trace of the episode played again, the recorded one; None where an error left none."""
-    for change in changes(record.origin, manifest(setting)):
+    for change in changes(record.origin, manifest(prepared)):
         print(f"cavsumo: {change}", file=sys.stderr)
-    with Worker(setting) as worker:
+    with Worker(prepared) as worker:
         again = replayed(worker, record)
     compare(record, again)
     frames = record.trace.frames if record.trace is not None else None
@@ -99,15 +99,15 @@ def _played(setting: Setting, record: Record) -> Trace | None:
     return parsed(again.trace) if again.trace else None
 
 
-def _show(setting: Setting, record: Record, trace: Trace, wanted: Wanted) -> None:
+def _show(prepared: PreparedBatch, record: Record, trace: Trace, wanted: ReplayOptions) -> None:
     """Write and show what was asked for."""
     if wanted.fcd is not None:
         write_fcd(trace, wanted.fcd)
     if wanted.html is not None:
         from cavsumo.report.pages.replay.page import write_page
 
-        write_page(record, trace, setting.site, wanted.html)
+        write_page(record, trace, prepared.site, wanted.html)
     if wanted.gui:
         from cavsumo.interop.gui import show
 
-        show(trace, record.plan.scenario, setting.site, wanted.delay)
+        show(trace, record.plan.scenario, prepared.site, wanted.delay)

@@ -14,7 +14,7 @@ from cavsumo.report.junit import junit
 
 
 @dataclass(frozen=True)
-class Wanted:
+class ReportOptions:
     """What a report is asked for.
 
     Attributes:
@@ -32,7 +32,7 @@ class Wanted:
     replays: int = 20
 
 
-def report(results: Sequence[Path], wanted: Wanted = Wanted()) -> int:
+def report(results: Sequence[Path], wanted: ReportOptions = ReportOptions()) -> int:
     """Read, compute, and say it; nothing is written when anything is wrong."""
     for option in ("output", "junit", "html"):
         _check_output(f"--{option}", getattr(wanted, option), results)

@@ -9,14 +9,14 @@ from pathlib import Path
 from typing import Any
 
 from cavsumo.agents.casting import make_agents
-from cavsumo.batch.batch_run import Session
+from cavsumo.batch.batch_run import BatchRun
 from cavsumo.batch.executors import Means, opened
 from cavsumo.batch.interrupts import Interrupts
-from cavsumo.batch.preflight import Checked, Manner, checked
-from cavsumo.batch.prepared import Setting
+from cavsumo.batch.preflight import CheckedBatch, Manner, checked
+from cavsumo.batch.prepared import PreparedBatch
 from cavsumo.batch.stopping import looks_at_rows
 from cavsumo.batch.summary import Ended, summarise
-from cavsumo.batch.worker import rehearse
+from cavsumo.batch.worker import try_out
 from cavsumo.egos import make_ego
 from cavsumo.errors import CavsumoError, Exit, InputError
 from cavsumo.model.study import Part
@@ -36,12 +36,14 @@ def run_study(parts: Sequence[Part], output: Path, means: Means, manner: Manner)
     return exit_status(ended, interrupted, manner.exit_zero)
 
 
-def played(batches: Sequence[Checked], means: Means, manner: Manner) -> tuple[list[Ended], bool]:
+def played(
+    batches: Sequence[CheckedBatch], means: Means, manner: Manner
+) -> tuple[list[Ended], bool]:
     """Play batches that were checked; what they came to, and whether that was cut short."""
     ended: list[Ended] = []
     with opened(means) as (executor, jobs), Interrupts(manner.quiet) as interrupts:
         for batch in batches:
-            _rehearse(executor, batch.setting)
+            _try_out(executor, batch.prepared)
         for batch in batches:
             if interrupts() and ended:
                 break
@@ -50,10 +52,10 @@ def played(batches: Sequence[Checked], means: Means, manner: Manner) -> tuple[li
     return ended, interrupts() and cut_short
 
 
-def _rehearse(executor: Executor, setting: Setting) -> None:
-    """Have the setting loaded once, where it will be played."""
+def _try_out(executor: Executor, prepared: PreparedBatch) -> None:
+    """Have the batch loaded once, where it will be played."""
     try:
-        executor.submit(rehearse, setting).result()
+        executor.submit(try_out, prepared).result()
     except CavsumoError:
         raise
     except Exception as error:  # whatever keeps an executor's processes from playing
@@ -61,42 +63,42 @@ def _rehearse(executor: Executor, setting: Setting) -> None:
 
 
 def _play(
-    batch: Checked, executor: Executor, jobs: int, interrupts: Interrupts, manner: Manner
+    batch: CheckedBatch, executor: Executor, jobs: int, interrupts: Interrupts, manner: Manner
 ) -> Ended:
     """Play a batch into its file, or what is left of it."""
-    setting = batch.setting
+    prepared = batch.prepared
     with Recorder(batch.output) as recorder:
-        session = Session(setting, recorder, executor, jobs, interrupts, manner.quiet)
+        batch_run = BatchRun(prepared, recorder, executor, jobs, interrupts, manner.quiet)
         if batch.recorded is None:
-            session.begin(batch.manifest, overwrite=manner.overwrite)
+            batch_run.begin(batch.manifest, overwrite=manner.overwrite)
         else:
-            session.resume({**batch.recorded, "plan": batch.manifest["plan"]})
+            batch_run.resume({**batch.recorded, "plan": batch.manifest["plan"]})
         if not manner.quiet:
             print(_first_line(batch, jobs), file=sys.stderr)
-        _carry_out(session, manner)
+        _carry_out(batch_run, manner)
     return Ended(
         batch.name,
         batch.output,
-        session.tally,
+        batch_run.tally,
         recorder.traces,
-        sequential=looks_at_rows(setting.plan),
-        shared=setting.plan.reset == "shared",
-        cut_short=session.cut_short or session.status == "interrupted",
-        promises={n: make_agents(setting.plan, n)[0].promise for n in setting.plan.cast},
+        sequential=looks_at_rows(prepared.plan),
+        shared=prepared.plan.reset == "shared",
+        cut_short=batch_run.cut_short or batch_run.status == "interrupted",
+        promises={n: make_agents(prepared.plan, n)[0].promise for n in prepared.plan.cast},
     )
 
 
-def _carry_out(session: Session, manner: Manner) -> None:
+def _carry_out(batch_run: BatchRun, manner: Manner) -> None:
     """Do what was asked for, and complete the manifest whatever happens."""
     try:
         if manner.retry_errors:
-            session.retry()
+            batch_run.retry()
         if manner.resume or not manner.retry_errors:
-            session.play()
+            batch_run.play()
     except KeyboardInterrupt:  # twice: what runs is given up
-        session.status = "interrupted"
+        batch_run.status = "interrupted"
     finally:
-        session.end()
+        batch_run.end()
 
 
 def exit_status(ended: Sequence[Ended], interrupted: bool, exit_zero: bool) -> int:
@@ -110,10 +112,10 @@ def exit_status(ended: Sequence[Ended], interrupted: bool, exit_zero: bool) -> i
     return Exit.VIOLATED if violated and not exit_zero else Exit.OK
 
 
-def _first_line(batch: Checked, jobs: int) -> str:
+def _first_line(batch: CheckedBatch, jobs: int) -> str:
     """What was chosen, for the user to see."""
-    setting = batch.setting
-    plan, scenario, route = setting.plan, setting.plan.scenario, setting.site.route
+    prepared = batch.prepared
+    plan, scenario, route = prepared.plan, prepared.plan.scenario, prepared.site.route
     ego = make_ego(scenario.ego, scenario.ego_params)
     attributes = " ".join(f"{k}={v}" for k, v in getattr(ego, "attributes", {}).items())
     driver = f"{scenario.ego} ({attributes})" if attributes else scenario.ego

@@ -119,10 +119,10 @@ def _add_output(group: Any) -> None:
 
 
 def _certify(options: argparse.Namespace) -> int:
-    from cavsumo.cli.commands.certify import Order, certify
+    from cavsumo.cli.commands.certify import CertifyOptions, certify
 
-    given = {f.name: getattr(options, f.name) for f in dataclasses.fields(Order)}
+    given = {f.name: getattr(options, f.name) for f in dataclasses.fields(CertifyOptions)}
     given["egos"] = tuple(word for words in options.egos or () for word in words)
     given["param"] = dict(assignment("--param", word) for word in options.param)
     given["ego_param"] = dict(assignment("--ego-param", word) for word in options.ego_param)
-    return certify(Order(**given))
+    return certify(CertifyOptions(**given))

@@ -49,8 +49,8 @@ def add_game(commands: Any) -> None:
 
 
 def _solve(options: argparse.Namespace) -> int:
-    from cavsumo.cli.commands.game import Order, solve_file
+    from cavsumo.cli.commands.game import SolveOptions, solve_file
 
     return solve_file(
-        Order(**{f.name: getattr(options, f.name) for f in dataclasses.fields(Order)})
+        SolveOptions(**{f.name: getattr(options, f.name) for f in dataclasses.fields(SolveOptions)})
     )

@@ -59,13 +59,17 @@ def add_import_osm(commands: Any) -> None:
 
 
 def _inspect(options: argparse.Namespace) -> int:
-    from cavsumo.cli.commands.inspect import Look, inspect
+    from cavsumo.cli.commands.inspect import InspectOptions, inspect
 
-    return inspect(Look(**{f.name: getattr(options, f.name) for f in dataclasses.fields(Look)}))
+    return inspect(
+        InspectOptions(
+            **{f.name: getattr(options, f.name) for f in dataclasses.fields(InspectOptions)}
+        )
+    )
 
 
 def _import_osm(options: argparse.Namespace) -> int:
-    from cavsumo.cli.commands.import_osm import Order, import_osm
+    from cavsumo.cli.commands.import_osm import ImportOptions, import_osm
 
-    values = {f.name: getattr(options, f.name) for f in dataclasses.fields(Order)}
-    return import_osm(Order(**values))
+    values = {f.name: getattr(options, f.name) for f in dataclasses.fields(ImportOptions)}
+    return import_osm(ImportOptions(**values))

@@ -90,17 +90,21 @@ def add_merge(commands: Any) -> None:
 
 
 def _replay(options: argparse.Namespace) -> int:
-    from cavsumo.cli.commands.replay import Wanted, replay
+    from cavsumo.cli.commands.replay import ReplayOptions, replay
 
-    names = [field.name for field in dataclasses.fields(Wanted)]
-    return replay(options.results, Wanted(**{name: getattr(options, name) for name in names}))
+    names = [field.name for field in dataclasses.fields(ReplayOptions)]
+    return replay(
+        options.results, ReplayOptions(**{name: getattr(options, name) for name in names})
+    )
 
 
 def _report(options: argparse.Namespace) -> int:
-    from cavsumo.cli.commands.report import Wanted, report
+    from cavsumo.cli.commands.report import ReportOptions, report
 
-    names = [field.name for field in dataclasses.fields(Wanted)]
-    return report(options.results, Wanted(**{name: getattr(options, name) for name in names}))
+    names = [field.name for field in dataclasses.fields(ReportOptions)]
+    return report(
+        options.results, ReportOptions(**{name: getattr(options, name) for name in names})
+    )
 
 
 def _merge(options: argparse.Namespace) -> int:

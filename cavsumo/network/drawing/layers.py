@@ -27,7 +27,7 @@ from cavsumo.network.drawing.surfaces import (
     walking_areas,
 )
 from cavsumo.network.facts import PRIORITY, SIGNALS
-from cavsumo.network.inspection import Ground, Way
+from cavsumo.network.inspection import InspectedNetwork, Way
 from cavsumo.network.reader import street
 
 Box = tuple[float, float, float, float]  # west, south, east, north [m]
@@ -50,7 +50,7 @@ BESIDE_M = {"straight": 0.0, "left": 0.5, "right": -0.5, "u-turn": 1.0}  # route
 # Surfaces
 
 
-def draw_surfaces(axes: Axes, here: Ground, view: Box) -> None:
+def draw_surfaces(axes: Axes, here: InspectedNetwork, view: Box) -> None:
     """Junctions, lanes by kind, the lines between them, walking areas, street names."""
     network, window = here.network, shapely.box(*view)
     _fill(axes, junctions(network), window, ROAD, 1)
@@ -69,7 +69,7 @@ def lane_color(lane: Any) -> str:
     return LANES[lane_kind(lane)]
 
 
-def _draw_names(axes: Axes, here: Ground, window: shapely.Geometry) -> None:
+def _draw_names(axes: Axes, here: InspectedNetwork, window: shapely.Geometry) -> None:
     """Each street's name, where most of it is seen."""
     best: dict[str, LineString] = {}
     for edge in here.network.edges:
@@ -90,7 +90,7 @@ def _draw_names(axes: Axes, here: Ground, window: shapely.Geometry) -> None:
         text.set_path_effects([withStroke(linewidth=2.5, foreground="white", alpha=0.8)])
 
 
-def draw_crossings(axes: Axes, here: Ground, view: Box) -> None:
+def draw_crossings(axes: Axes, here: InspectedNetwork, view: Box) -> None:
     """Zebra stripes where pedestrians have priority, two lines elsewhere, dots at signals."""
     window = shapely.box(*view)
     for axis, half, right in crossings(here.network):

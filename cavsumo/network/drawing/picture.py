@@ -38,7 +38,7 @@ from cavsumo.network.drawing.layers import (
 )
 from cavsumo.network.drawing.surfaces import credit
 from cavsumo.network.facts import NONE, PRIORITY, SIGNALS, right_of_way
-from cavsumo.network.inspection import Ground, Junction, Way
+from cavsumo.network.inspection import InspectedNetwork, Junction, Way
 from cavsumo.network.reader import lane_shape
 
 MARGIN_M = 12.0  # around the routes
@@ -50,7 +50,7 @@ CROSSING_LABELS = {
 }
 
 
-def draw(here: Ground, junction: Junction | None, file: Path) -> None:
+def draw(here: InspectedNetwork, junction: Junction | None, file: Path) -> None:
     """Draw a junction, or the whole network when there is none; raises InputError."""
     ways = junction.ways if junction else ()
     view = _view(here, ways)
@@ -81,7 +81,7 @@ def draw(here: Ground, junction: Junction | None, file: Path) -> None:
         raise InputError(f"--picture {str(file)!r}: {error.strerror}") from error
 
 
-def _view(here: Ground, ways: Sequence[Way]) -> Box:
+def _view(here: InspectedNetwork, ways: Sequence[Way]) -> Box:
     """What to show: the routes and what lies around them."""
     paths = [LineString(way.route.path.points) for way in ways]
     shown = paths or [
@@ -109,7 +109,7 @@ def _draw_scale(axes: Axes, view: Box) -> None:
     axes.text(x + length / 2, y + tall, f"{length:g} m", ha="center", va="bottom", zorder=11)
 
 
-def _titles(here: Ground, junction: Junction | None) -> tuple[str, str]:
+def _titles(here: InspectedNetwork, junction: Junction | None) -> tuple[str, str]:
     """The streets, and the junction's id, as far as the font has the letters."""
     file = here.network.file.name
     if junction is None:
@@ -118,7 +118,7 @@ def _titles(here: Ground, junction: Junction | None) -> tuple[str, str]:
     return streets, f"junction {junction.id}, {file}"
 
 
-def _legend(here: Ground, ways: Sequence[Way]) -> list[Any]:
+def _legend(here: InspectedNetwork, ways: Sequence[Way]) -> list[Any]:
     """What the colours mean, as far as they occur."""
     handles: list[Any] = []
     if ways:

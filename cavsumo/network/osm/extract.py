@@ -53,7 +53,7 @@ class Item:
 
 
 @dataclass
-class Roads:
+class RoadExtract:
     """What belongs to the roads of an extract, and what it says about where it is.
 
     Attributes:
@@ -84,9 +84,9 @@ def parse_box(text: str) -> Box:
     return west, south, east, north
 
 
-def find_roads(file: Path, box: Box | None) -> Roads:
+def find_roads(file: Path, box: Box | None) -> RoadExtract:
     """The roads of an extract, whole, that touch the box; raises InputError when there are none."""
-    found, places = Roads(), dict[int, tuple[float, float]]()
+    found, places = RoadExtract(), dict[int, tuple[float, float]]()
     tracks: list[tuple[Item, bool]] = []  # ways, and whether they are roads
     for item in read_items(file):  # in any order: Overpass may put ways before their nodes
         _note_hints(item, found.hints)
@@ -123,7 +123,7 @@ def _within(place: tuple[float, float] | None, box: Box | None) -> bool:
     return box[0] <= place[0] <= box[2] and box[1] <= place[1] <= box[3]
 
 
-def write_roads(file: Path, roads: Roads, target: TextIO) -> None:
+def write_roads(file: Path, roads: RoadExtract, target: TextIO) -> None:
     """Write the roads found in an extract as OSM XML, with whole turn restrictions.
 
     Nodes come first, wherever they stand in the extract: netconvert finds no others.
@@ -234,7 +234,7 @@ def _from_osmium(item: Any) -> Item:
     return Item("relation", item.id, tags, members=members)
 
 
-def _is_kept(item: Item, roads: Roads) -> bool:
+def _is_kept(item: Item, roads: RoadExtract) -> bool:
     """Whether an item belongs to the roads: one of them, its nodes, a whole turn restriction."""
     if item.kind == "node":
         return item.id in roads.nodes

@@ -17,7 +17,7 @@ from cavsumo.results.traces import Shape
 CLOSING_MPS = 0.01  # slower than this nobody comes nearer
 
 
-class Moment(NamedTuple):
+class CurvePoint(NamedTuple):
     """The curves at one timestep."""
 
     speed: float  # of the ego [m/s]
@@ -25,7 +25,7 @@ class Moment(NamedTuple):
     ttc: float | None  # s
 
 
-def moment(frame: Mapping[str, Any], shapes: Mapping[str, Shape]) -> Moment:
+def moment(frame: Mapping[str, Any], shapes: Mapping[str, Shape]) -> CurvePoint:
     """The curves at a frame of a trace."""
     ego = frame["ego"]
     own = _box(ego, shapes["ego"])
@@ -34,7 +34,7 @@ def moment(frame: Mapping[str, Any], shapes: Mapping[str, Shape]) -> Moment:
         distance = gap(own, _box(state, shapes[name]))
         near.append((distance, time_to_collision(distance, ego, state)))
     times = [t for _, t in near if t is not None]
-    return Moment(ego[2], min((d for d, _ in near), default=None), min(times, default=None))
+    return CurvePoint(ego[2], min((d for d, _ in near), default=None), min(times, default=None))
 
 
 def time_to_collision(distance: float, ego: list[float], other: list[float]) -> float | None:

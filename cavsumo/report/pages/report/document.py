@@ -13,9 +13,9 @@ from markupsafe import Markup
 from cavsumo.batch.summary import percent
 from cavsumo.report.analysis import Report
 from cavsumo.report.cells import TOPICS, Table, number
-from cavsumo.report.compare import EVENTS, Comparison
+from cavsumo.report.compare import EVENTS, PairedComparison
 from cavsumo.report.pages.report import words
-from cavsumo.report.pages.report.links import Look, chosen, with_pages, write_pages
+from cavsumo.report.pages.report.links import LinkedRun, chosen, with_pages, write_pages
 from cavsumo.report.pages.report.places import MEANING, Map, maps
 from cavsumo.report.pages.report.plots import (
     DASHES,
@@ -26,7 +26,7 @@ from cavsumo.report.pages.report.plots import (
     shares_plot,
     survival_plot,
 )
-from cavsumo.report.pages.report.scenes import Scene, scenes
+from cavsumo.report.pages.report.scenes import BatchPlace, scenes
 from cavsumo.report.pages.shell import render, write
 from cavsumo.report.rates import Share
 from cavsumo.report.survival import Curve
@@ -80,9 +80,9 @@ def write_report(report: Report, file: Path, replays: int) -> None:
 
 def page(
     report: Report,
-    played: Sequence[Scene],
-    failures: Sequence[Look],
-    tests: Sequence[Look],
+    played: Sequence[BatchPlace],
+    failures: Sequence[LinkedRun],
+    tests: Sequence[LinkedRun],
     folder: str,
 ) -> str:
     """The page, with links into a folder of replays."""
@@ -152,7 +152,7 @@ def _plot(
     return Plot(title, Markup(draw(bars, title)), note=note)
 
 
-def _ratio(one: Comparison) -> str:
+def _ratio(one: PairedComparison) -> str:
     """The ratio beside its bar."""
     if one.ratio is None:
         return "none found"
@@ -177,7 +177,7 @@ def _curves(report: Report) -> Iterator[Plot]:
         yield Plot(setting, svg, legend, f"{more} more are in the table." if more else "")
 
 
-def _drawn(one: Map, report: Report, looks: Sequence[Look]) -> dict[str, Any]:
+def _drawn(one: Map, report: Report, looks: Sequence[LinkedRun]) -> dict[str, Any]:
     """A map for the template: every dot with its words and, for a single run, its page."""
     pages = {look.index: look.page for look in looks}
     rows = report.evidence.rows

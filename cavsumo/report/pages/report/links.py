@@ -18,7 +18,7 @@ from cavsumo.errors import InputError
 from cavsumo.report.analysis import Report
 from cavsumo.report.load import Batch
 from cavsumo.report.pages.replay.page import write_page
-from cavsumo.report.pages.report.scenes import Scene
+from cavsumo.report.pages.report.scenes import BatchPlace
 from cavsumo.results.reading import whole_lines
 from cavsumo.results.traces import read_trace
 
@@ -27,7 +27,7 @@ TESTS = 10  # passed tests are listed if none is wanted as a page
 
 
 @dataclass(frozen=True)
-class Look:
+class LinkedRun:
     """A run worth looking at.
 
     Attributes:
@@ -54,7 +54,7 @@ class Look:
     page: str = ""
 
 
-def chosen(report: Report, pages: int) -> tuple[list[Look], list[Look]]:
+def chosen(report: Report, pages: int) -> tuple[list[LinkedRun], list[LinkedRun]]:
     """Failures and passed tests to be listed, those to be shown as pages first."""
     rows = report.evidence.rows
     settings = {int(i): group.setting for group in report.groups for i in group.rows.index}
@@ -76,14 +76,14 @@ def _looks(
     rows: pandas.DataFrame,
     settings: Mapping[int, str],
     alike: Mapping[tuple[str, int], int],
-) -> list[Look]:
+) -> list[LinkedRun]:
     """Rows as runs to look at."""
     found = []
     for row in rows.itertuples():
         test, failed = report.tests[int(row.Index)], row.outcome == "violated"
         event = test.impact if failed and test.impact is not None else test.trigger
         run = int(row.run)
-        look = Look(
+        look = LinkedRun(
             index=int(row.Index),
             batch=int(row.batch),
             run=run,
@@ -101,8 +101,8 @@ def _looks(
 
 
 def with_pages(
-    looks: Sequence[Look], most: int, report: Report, scenes: Sequence[Scene]
-) -> list[Look]:
+    looks: Sequence[LinkedRun], most: int, report: Report, scenes: Sequence[BatchPlace]
+) -> list[LinkedRun]:
     """The same, the first of those that can be shown with names for their pages.
 
     A page needs the trace, and the network as it was.
@@ -115,13 +115,13 @@ def with_pages(
     ]
 
 
-def _name(look: Look, several: bool) -> str:
+def _name(look: LinkedRun, several: bool) -> str:
     """The name of the page of a run."""
     return f"{f'batch{look.batch + 1}-' if several else ''}run{look.run:06d}.html"
 
 
 def write_pages(
-    looks: Sequence[Look], batches: Sequence[Batch], scenes: Sequence[Scene], folder: Path
+    looks: Sequence[LinkedRun], batches: Sequence[Batch], scenes: Sequence[BatchPlace], folder: Path
 ) -> None:
     """Write the pages of those that have a name for it into a folder; raises InputError."""
     wanted = [look for look in looks if look.page]
@@ -140,7 +140,7 @@ def write_pages(
 
 
 def _write_page(
-    look: Look, row: Mapping[str, str], batch: Batch, scene: Scene, folder: Path
+    look: LinkedRun, row: Mapping[str, str], batch: Batch, scene: BatchPlace, folder: Path
 ) -> None:
     """Write the page of a run."""
     assert scene.plan is not None

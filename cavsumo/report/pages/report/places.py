@@ -15,7 +15,7 @@ from cavsumo.network.reader import read_network
 from cavsumo.report.analysis import Report
 from cavsumo.report.events import Event
 from cavsumo.report.pages.replay.scenery import View, outlines
-from cavsumo.report.pages.report.scenes import Scene
+from cavsumo.report.pages.report.scenes import BatchPlace
 
 PASSED, FAILED, IMPACT = "passed", "failed", "impact"
 MEANING = {
@@ -90,7 +90,7 @@ class Map:
     credit: str
 
 
-def maps(report: Report, scenes: Sequence[Scene]) -> list[Map]:
+def maps(report: Report, scenes: Sequence[BatchPlace]) -> list[Map]:
     """A map for each scene in which any test is known to have happened somewhere."""
     spots: dict[int, list[Spot]] = {}
     for batch, spot in _spots(report):
@@ -140,7 +140,7 @@ def _mean(values: Iterable[float]) -> float:
     return math.fsum(found) / len(found)
 
 
-def _map(scene: Scene, spots: Sequence[Spot]) -> Map:
+def _map(scene: BatchPlace, spots: Sequence[Spot]) -> Map:
     """A map of some spots."""
     dots, apart = merged(spots)
     west, south, east, north = view = _view(dots)

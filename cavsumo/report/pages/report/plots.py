@@ -20,7 +20,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
-from cavsumo.report.compare import Comparison
+from cavsumo.report.compare import PairedComparison
 from cavsumo.report.pages.report.words import JOINT
 from cavsumo.report.rates import Share
 from cavsumo.report.survival import Curve
@@ -68,7 +68,7 @@ def share_bar(label: str, share: Share, text: str) -> Bar:
     return Bar(label, share.value, ends.low, ends.high, text)
 
 
-def ratio_bar(label: str, one: Comparison, text: str) -> Bar:
+def ratio_bar(label: str, one: PairedComparison, text: str) -> Bar:
     """A ratio of rates."""
     low, high = one.interval or (None, None)
     return Bar(label, one.ratio, low, high, text)

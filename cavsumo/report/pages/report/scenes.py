@@ -14,7 +14,7 @@ from cavsumo.report.load import Batch
 
 
 @dataclass(frozen=True)
-class Scene:
+class BatchPlace:
     """One place, of one or several batches.
 
     Attributes:
@@ -32,9 +32,9 @@ class Scene:
     batches: list[int] = field(default_factory=list)
 
 
-def scenes(batches: Sequence[Batch]) -> list[Scene]:
+def scenes(batches: Sequence[Batch]) -> list[BatchPlace]:
     """The scenes of all batches, in their order; those of equal scenarios are one."""
-    found: dict[str, Scene] = {}
+    found: dict[str, BatchPlace] = {}
     for i, batch in enumerate(batches):
         checksums = sorted(dict(batch.manifest.get("sha256") or {}).items())
         key = repr((batch.plan.scenario, checksums))
@@ -44,12 +44,12 @@ def scenes(batches: Sequence[Batch]) -> list[Scene]:
     return list(found.values())
 
 
-def _scene(batch: Batch) -> Scene:
+def _scene(batch: Batch) -> BatchPlace:
     """Where a batch was played: the very files, known by their checksums."""
     name = batch.plan.scenario.name
     try:
         record = Record(batch.plan, {}, None, batch.manifest, batch.csv_file)
         plan = located(record, None, None).plan
-        return Scene(name, plan, prepare(plan).site, "")
+        return BatchPlace(name, plan, prepare(plan).site, "")
     except CavsumoError as error:
-        return Scene(name, None, None, str(error))
+        return BatchPlace(name, None, None, str(error))
