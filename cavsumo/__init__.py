@@ -16,16 +16,22 @@ __version__ = "0.1.0"
 _MOVED = {
     "bodies": "model.bodies",
     "checks": "model.checks",
+    "commands": "cli.commands",
     "contacts": "assertions.contacts",
+    "ego_observations": "envs.ego_observations",
+    "ego_rewards": "envs.ego_rewards",
+    "executors": "batch.executors",
     "formulas": "assertions.formulas",
     "kinematics": "model.kinematics",
     "metrics": "assertions.metrics",
     "observations": "agents.observations",
     "policies": "agents.policy_file",
+    "rewards": "simulation.rewards",
     "roads": "model.carriageway",
     "scene": "model.scene",
     "sensors": "model.sensors",
     "snapshot": "model.snapshot",
+    "statistics": "results.statistics",
 }
 
 

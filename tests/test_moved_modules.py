@@ -13,7 +13,12 @@ import cavsumo
 MOVED = {
     "cavsumo.bodies": "cavsumo.model.bodies",
     "cavsumo.checks": "cavsumo.model.checks",
+    "cavsumo.commands": "cavsumo.cli.commands",
+    "cavsumo.commands.run": "cavsumo.cli.commands.run",
     "cavsumo.contacts": "cavsumo.assertions.contacts",
+    "cavsumo.ego_observations": "cavsumo.envs.ego_observations",
+    "cavsumo.ego_rewards": "cavsumo.envs.ego_rewards",
+    "cavsumo.executors": "cavsumo.batch.executors",
     "cavsumo.formulas": "cavsumo.assertions.formulas",
     "cavsumo.formulas.syntax": "cavsumo.assertions.formulas.syntax",
     "cavsumo.kinematics": "cavsumo.model.kinematics",
@@ -21,10 +26,12 @@ MOVED = {
     "cavsumo.metrics.plane": "cavsumo.assertions.metrics.plane",
     "cavsumo.observations": "cavsumo.agents.observations",
     "cavsumo.policies": "cavsumo.agents.policy_file",
+    "cavsumo.rewards": "cavsumo.simulation.rewards",
     "cavsumo.roads": "cavsumo.model.carriageway",
     "cavsumo.scene": "cavsumo.model.scene",
     "cavsumo.sensors": "cavsumo.model.sensors",
     "cavsumo.snapshot": "cavsumo.model.snapshot",
+    "cavsumo.statistics": "cavsumo.results.statistics",
 }
 
 
@@ -63,6 +70,8 @@ def test_the_order_of_imports_does_not_matter(old_first: bool) -> None:
         "from cavsumo.metrics.plane import ttc_boxes",
         "from cavsumo.policies import Header, Observed, Policy",
         "from cavsumo.roads import Start, Approach",
+        "from cavsumo.results import read_rows",
+        "from cavsumo.commands.run import Manner, run",
     ],
 )
 def test_statements_of_users(statement: str) -> None:

@@ -144,7 +144,7 @@ def test_values_between_the_points() -> None:
     assert middle == pytest.approx((first + second) / 2)
 
 
-def outlooks(kerb: float) -> tuple[ConstantSpeed, Unaware, Free]:
+def forceabilities(kerb: float) -> tuple[ConstantSpeed, Unaware, Free]:
     """One body's view of the three classes."""
     free = Unaware(PEDESTRIAN, solved(FREE), B, 0.02, kerb), Free(PEDESTRIAN, solved(FREE), B, 0.02)
     return ConstantSpeed(PEDESTRIAN, solved(SMALL), B, 0.02), *free
@@ -154,21 +154,21 @@ def outlooks(kerb: float) -> tuple[ConstantSpeed, Unaware, Free]:
 @given(st.floats(0.1, 80.0), st.floats(2.3, 8.9), st.floats(0.1, 9.0), st.floats(0.0, 1.4))
 def test_the_classes_contain_each_other(gap: float, v: float, left: float, walk: float) -> None:
     """What is sure against any ego is sure against an unaware one and one that keeps its speed."""
-    constant, unaware, free = outlooks(kerb=2.0)
+    constant, unaware, free = forceabilities(kerb=2.0)
     here = Relative(gap, left, v, walk, 0.0)
     if free.sure(here):
         assert unaware.sure(here)
     if unaware.sure(here):
         assert constant.possible(here)
-    for outlook in (constant, unaware, free):
-        assert outlook.possible(here) or not outlook.sure(here)
+    for forceability in (constant, unaware, free):
+        assert forceability.possible(here) or not forceability.sure(here)
 
 
 def test_an_ego_that_stands_or_is_too_fast_is_of_no_class() -> None:
     """Nothing is promised against it."""
-    constant, unaware, free = outlooks(kerb=2.0)
-    for outlook in (constant, unaware, free):
-        assert not outlook.sure(Relative(50.0, 1.0, 0.0, 0.0, 0.0))
+    constant, unaware, free = forceabilities(kerb=2.0)
+    for forceability in (constant, unaware, free):
+        assert not forceability.sure(Relative(50.0, 1.0, 0.0, 0.0, 0.0))
     assert not free.sure(Relative(1000.0, 1.0, 9.5, 0.0, 0.0))
     assert constant.sure(Relative(1000.0, 1.0, 9.5, 0.0, 0.0))
 

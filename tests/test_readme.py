@@ -13,7 +13,7 @@ from pathlib import Path
 import pytest
 
 from cavsumo.batch.preflight import Manner, checked
-from cavsumo.cli import _parser
+from cavsumo.cli.command_line import _parser
 from cavsumo.cli.scenario_settings import parts_of
 
 ROOT = Path(__file__).resolve().parents[1]

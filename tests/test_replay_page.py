@@ -175,7 +175,8 @@ def test_a_wheel_has_the_players_files(tmp_path: Path) -> None:
     )  # fmt: skip
     assert done.returncode == 0, done.stderr
     names = zipfile.ZipFile(next(tmp_path.glob("*.whl"))).namelist()
-    templates = ["pages/shell.html.j2", "player/player.html.j2", "report/page/report.html.j2"]
+    names_of = ("shell", "replay/player", "report/report")
+    templates = [f"report/pages/{name}.html.j2" for name in names_of]
     for file in [*templates, *(f"{name.split('.')[0]}.css" for name in templates)]:
         assert f"cavsumo/{file}" in names
         assert (ROOT / "cavsumo" / file).is_file()

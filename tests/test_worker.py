@@ -347,7 +347,7 @@ from pathlib import Path
 name = "cavsumo.batch.worker_process"
 if name in sys.orig_argv:
     import cavsumo
-    source = (Path(cavsumo.__file__).parent / "worker_process.py").read_text()
+    source = (Path(cavsumo.__file__).parent / "batch" / "worker_process.py").read_text()
     assert "IDLE_S = 60.0" in source
     sys.argv = sys.orig_argv[sys.orig_argv.index(name):]
     exec(source.replace("IDLE_S = 60.0", "IDLE_S = 0.2"), {"__name__": "__main__"})

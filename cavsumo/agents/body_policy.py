@@ -22,12 +22,12 @@ from cavsumo.model.snapshot import BodyState, Snapshot
 PASSED_M = 1.0  # how far behind the body the ego's rear must be to be no danger any more
 
 
-class Tactic:
+class BodyPolicy:
     """The policy of one body; begin a new one for each episode.
 
     Args:
-        outlooks: the class of egos it plays against; behind it those that it falls back on where
-            nothing can be forced against that one.
+        forceabilities: the class of egos it plays against; behind it those that it falls back on
+            where nothing can be forced against that one.
         escape: a heading relative to the way across on which it goes at once, for bodies that
             come too late on the straight way [rad]; None for the policy.
 
@@ -39,10 +39,10 @@ class Tactic:
         self,
         scene: Scene,
         index: int,
-        outlooks: Sequence[Forceability],
+        forceabilities: Sequence[Forceability],
         escape: float | None = None,
     ) -> None:
-        self.scene, self.index, self.outlooks = scene, index, tuple(outlooks)
+        self.scene, self.index, self.forceabilities = scene, index, tuple(forceabilities)
         self.where = Coordinates(scene, index)
         self.kerb = ApproachKerb(scene, index)
         self.escape = escape
@@ -52,14 +52,14 @@ class Tactic:
     def sure(self, snapshot: Snapshot) -> bool:
         """Whether the goal is sure from here, against the class of egos or one fallen back on."""
         here = self.where(snapshot)
-        return here is not None and any(o.sure(here) for o in self.outlooks)
+        return here is not None and any(o.sure(here) for o in self.forceabilities)
 
     def lost(self, snapshot: Snapshot) -> bool:
         """Whether this body will not come to a test any more."""
         here = self.where(snapshot)
         if here is None or here.gap < self._passed:
             return True
-        return here.left > 0.0 and not self.outlooks[-1].possible(here)
+        return here.left > 0.0 and not self.forceabilities[-1].possible(here)
 
     def due(self, snapshot: Snapshot, idle: Action) -> float:
         """How much is to be gained by going now instead of idling: 1 where the test is sure now and
@@ -69,12 +69,12 @@ class Tactic:
         if here is None:
             return 0.0
         after = self._after(snapshot, here, idle)
-        for outlook in self.outlooks:
-            if outlook.sure(after):
+        for forceability in self.forceabilities:
+            if forceability.sure(after):
                 return 0.0
-            if outlook.sure(here):
+            if forceability.sure(here):
                 return 1.0
-        last = self.outlooks[-1]
+        last = self.forceabilities[-1]
         if not last.possible(here):
             return 0.0
         return max(0.0, min(0.5, last.worth(here) - last.worth(after)))
@@ -97,7 +97,7 @@ class Tactic:
             return walk(state, heading, 0.0 if there else top, dt)
         if self.escape is not None:
             return walk(state, heading + self.escape, 0.0 if self._touches(state) else top, dt)
-        wanted = here.left > 0.0 and self.outlooks[-1].possible(here)
+        wanted = here.left > 0.0 and self.forceabilities[-1].possible(here)
         return walk(state, heading, top if wanted else 0.0, dt)
 
     def _after(self, snapshot: Snapshot, here: Relative, idle: Action) -> Relative:

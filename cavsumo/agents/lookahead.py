@@ -6,7 +6,7 @@ follow its steering, are not foreseen.
 
 from __future__ import annotations
 
-from cavsumo.agents.body_policy import Tactic
+from cavsumo.agents.body_policy import BodyPolicy
 from cavsumo.agents.triggers import MAX_DECEL, REACTION_TIME
 from cavsumo.model.kinematics import step_floats
 from cavsumo.model.scene import Scene
@@ -14,23 +14,23 @@ from cavsumo.model.snapshot import BodyState, Snapshot
 from cavsumo.model.stopping_zones import zone_entered
 
 
-def succeeds(scene: Scene, snapshot: Snapshot, tactic: Tactic) -> bool:
-    """Whether a body that plays alone enters the reaction zone first, by a fresh tactic."""
+def succeeds(scene: Scene, snapshot: Snapshot, policy: BodyPolicy) -> bool:
+    """Whether a body that plays alone enters the reaction zone first, by a fresh policy."""
     path, ego = scene.ego_path, snapshot.ego
     if ego.v <= 0.0:
         return False
     along, end = scene.ego_progress(snapshot), path.length - ego.body.kind.length / 2
     while True:
-        state = snapshot.testers[tactic.index]
+        state = snapshot.testers[policy.index]
         zone = _zone(snapshot, state)
         if zone is not None:
             return zone == "reaction"
         along += ego.v * scene.dt
         time = snapshot.time + scene.dt
-        if along > end or time > scene.horizon + 1e-9 or _behind(scene, tactic, along):
+        if along > end or time > scene.horizon + 1e-9 or _behind(scene, policy, along):
             return False
         testers = list(snapshot.testers)
-        testers[tactic.index] = _moved(scene, snapshot, state, tactic)
+        testers[policy.index] = _moved(scene, snapshot, state, policy)
         x, y, o = path.at(along)
         driven = BodyState(ego.body, x, y, ego.v, o)
         snapshot = Snapshot(snapshot.step + 1, time, driven, 0.0, tuple(testers))
@@ -49,18 +49,18 @@ def _zone(snapshot: Snapshot, state: BodyState) -> str | None:
     )
 
 
-def _behind(scene: Scene, tactic: Tactic, along: float) -> bool:
+def _behind(scene: Scene, policy: BodyPolicy, along: float) -> bool:
     """Whether the ego has passed the body's way."""
-    met = tactic.where.meeting
+    met = policy.where.meeting
     return met is None or along - scene.ego.kind.length > met.along
 
 
-def _moved(scene: Scene, snapshot: Snapshot, state: BodyState, tactic: Tactic) -> BodyState:
+def _moved(scene: Scene, snapshot: Snapshot, state: BodyState, policy: BodyPolicy) -> BodyState:
     """The body after a timestep."""
-    if not tactic.going:
-        idle = tactic.idle(snapshot)
-        tactic.going = tactic.due(snapshot, idle) > 0.0
-    action = tactic.go(snapshot) if tactic.going else idle
+    if not policy.going:
+        idle = policy.idle(snapshot)
+        policy.going = policy.due(snapshot, idle) > 0.0
+    action = policy.go(snapshot) if policy.going else idle
     kind = state.body.kind
     if state.v == 0.0 and action.throttle <= 0.0:
         return state

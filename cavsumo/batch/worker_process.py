@@ -38,7 +38,7 @@ def main(pipe_fd: int, log_fd: int, parent: int) -> None:
 
 
 def _serve(pipe: Connection, prepared: PreparedBatch, strict: bool) -> None:
-    """Rehearse once, then play; a refusal is sent instead of None."""
+    """Try out the ego and SUMO once, then play; a refusal is sent instead of None."""
     from cavsumo.batch.episode_runner import EpisodeRunner
 
     with contextlib.ExitStack() as stack:

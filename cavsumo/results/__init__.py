@@ -4,3 +4,7 @@
 here plays an episode. To add a column: its name and meaning in ``columns``, its value in
 ``batch/episode_runner``.
 """
+
+from cavsumo.results.reading import read_results, read_rows
+
+__all__ = ["read_results", "read_rows"]
