@@ -14,13 +14,13 @@ import tempfile
 from collections.abc import Iterator
 from pathlib import Path
 
-from cavsumo.checked import Manner
-from cavsumo.commands.run import run
-from cavsumo.executors import Means
-from cavsumo.results import read_rows
-from cavsumo.statistics import Rate, rate
-from cavsumo.summary import interval, percent
-from cavsumo.tally import Found, Tally
+from cavsumo.batch.executors import Means
+from cavsumo.batch.preflight import Manner
+from cavsumo.batch.summary import interval, percent
+from cavsumo.batch.tally import Found, Tally
+from cavsumo.cli.commands.run import run
+from cavsumo.results.reading import read_rows
+from cavsumo.results.statistics import Rate, rate
 
 ROOT = Path(__file__).resolve().parent.parent
 EGOS = ("sumo", "time-gap", "constant")

@@ -15,7 +15,7 @@ import tempfile
 from collections import Counter
 from pathlib import Path
 
-from cavsumo.statistics import rate
+from cavsumo.results.statistics import rate
 
 ROOT = Path(__file__).resolve().parent.parent
 TRAIN_SEED, SEED = 101, 7

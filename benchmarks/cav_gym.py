@@ -21,22 +21,23 @@ from pathlib import Path
 import numpy as np
 
 from cavsumo.agents.walking import steer_to
-from cavsumo.batch import run_batch
-from cavsumo.bodies import PEDESTRIAN, Body
-from cavsumo.executors import local_executor
-from cavsumo.geometry import Box, overlap, zone_entered
-from cavsumo.jobs import job
-from cavsumo.kinematics import step_floats
-from cavsumo.outcomes import is_test
-from cavsumo.roads import Start
-from cavsumo.scenario import BatchPlan, plan_from
-from cavsumo.setting import Setting, prepare
-from cavsumo.site import Site
-from cavsumo.snapshot import BodyState
-from cavsumo.starts import draw_starts
-from cavsumo.statistics import rate
-from cavsumo.summary import interval, percent
-from cavsumo.tally import tallied
+from cavsumo.batch.dispatch import run_batch
+from cavsumo.batch.executors import local_executor
+from cavsumo.batch.jobs import job
+from cavsumo.batch.prepared import PreparedBatch, prepare
+from cavsumo.batch.summary import interval, percent
+from cavsumo.batch.tally import tallied
+from cavsumo.model.bodies import PEDESTRIAN, Body
+from cavsumo.model.carriageway import Start
+from cavsumo.model.geometry import Box, overlap
+from cavsumo.model.kinematics import step_floats
+from cavsumo.model.scenario import BatchPlan, plan_from
+from cavsumo.model.snapshot import BodyState
+from cavsumo.model.stopping_zones import zone_entered
+from cavsumo.network.pedestrian_starts import draw_starts
+from cavsumo.network.site import Site
+from cavsumo.results.rows import is_test
+from cavsumo.results.statistics import rate
 
 ROOT = Path(__file__).resolve().parent.parent
 SETTINGS = {
@@ -102,7 +103,7 @@ def force(runs: int) -> None:
     print(f"\n{'timing':>9}  {'tests, 95 %':>22}  unfair  forceable  won of them  of the bound")
     for testers in (1, 3, 6):
         count = runs if testers == 1 else runs // 2
-        made = setting(testers, ("timing",), count)
+        made = prepared(testers, ("timing",), count)
         possible = [forceable_episode(made.plan, made.site, run) for run in range(count)]
         rows = play(testers, ("timing",), count)
         found, bound = tallied(rows).rate("tests"), rate(sum(possible), count)
@@ -115,7 +116,7 @@ def force(runs: int) -> None:
         )
 
 
-def setting(testers: int, agents: tuple[str, ...], runs: int) -> Setting:
+def prepared(testers: int, agents: tuple[str, ...], runs: int) -> PreparedBatch:
     """The plan of a cell, ready to be played."""
     known = {"timing": {}, **dict.fromkeys(AGENTS, SETTINGS["params"])}
     params = known[agents[0]]
@@ -127,7 +128,7 @@ def setting(testers: int, agents: tuple[str, ...], runs: int) -> Setting:
 
 def play(testers: int, agents: tuple[str, ...], runs: int) -> list[dict[str, object]]:
     """The rows of a cell."""
-    made = setting(testers, agents, runs)
+    made = prepared(testers, agents, runs)
     with local_executor(2) as executor:
         return [outcome.row for outcome, _ in run_batch(made, executor, made.plan.todo())]
 

@@ -28,16 +28,17 @@ from typing import Any, ClassVar, NamedTuple
 
 import libsumo
 
+from cavsumo.agents.casting import make_agents
 from cavsumo.assertions.base import ASSERTIONS, Assertion
-from cavsumo.contacts import Contact
-from cavsumo.geometry import gap, in_frame, overlap
-from cavsumo.jobs import job, make_agents
-from cavsumo.scenario import plan_from
-from cavsumo.scene import Scene
-from cavsumo.setting import prepare
-from cavsumo.simulator import play
-from cavsumo.snapshot import BodyState, Snapshot
-from cavsumo.theatre import Theatre
+from cavsumo.assertions.contacts import Contact
+from cavsumo.batch.episode_runner import EpisodeRunner
+from cavsumo.batch.jobs import job
+from cavsumo.batch.prepared import prepare
+from cavsumo.model.geometry import gap, in_frame, overlap
+from cavsumo.model.scenario import plan_from
+from cavsumo.model.scene import Scene
+from cavsumo.model.snapshot import BodyState, Snapshot
+from cavsumo.simulation.loop import play
 
 ROOT = Path(__file__).resolve().parent.parent
 NETWORKS = ("crossing", "junction", "pedestrians")
@@ -289,12 +290,12 @@ def serve(pipe: Connection, setup: Setup, first: int, count: int) -> None:
         },
         "benchmark",
     )
-    with Theatre(plan, prepare(plan).site) as theatre:
-        watch = theatre.stage.assertions[0]
+    with EpisodeRunner(plan, prepare(plan).site) as runner:
+        watch = runner.setup.assertions[0]
         assert isinstance(watch, Watch)
         agents = make_agents(plan, setup.agent)
         for run in range(first, count):
-            play(theatre.stage, agents, job(plan, run).seed)
+            play(runner.setup, agents, job(plan, run).seed)
             pipe.send(watch.sightings)
 
 

@@ -14,11 +14,11 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from cavsumo import criticality
-from cavsumo.jobs import job
-from cavsumo.scenario import plan_from
-from cavsumo.setting import prepare
-from cavsumo.theatre import Theatre
+from cavsumo.assertions import criticality_monitor
+from cavsumo.batch.episode_runner import EpisodeRunner
+from cavsumo.batch.jobs import job
+from cavsumo.batch.prepared import prepare
+from cavsumo.model.scenario import plan_from
 
 NETWORKS = Path(__file__).resolve().parent.parent / "networks"
 PARTS = {
@@ -35,18 +35,20 @@ def main() -> None:
     spent = Counter[str]()
     for part, names in PARTS.items():
         for name in names:
-            setattr(criticality, name, timed(getattr(criticality, name), part, spent))
+            setattr(
+                criticality_monitor, name, timed(getattr(criticality_monitor, name), part, spent)
+            )
     print(f"{'':12}", *(f"{part:>13}" for part in PARTS), "  ms an episode")
     for network in ("crossing", "junction", "pedestrians"):
         net = NETWORKS / f"{network}.net.xml"
         settings = {"net": net, "runs": episodes, "trace": "none", "reference": "none"}
         plan = plan_from(settings, "benchmark")
-        with Theatre(plan, prepare(plan).site) as theatre:
-            theatre.play(job(plan, 0))
+        with EpisodeRunner(plan, prepare(plan).site) as runner:
+            runner.play(job(plan, 0))
             spent.clear()
             begun = time.process_time()
             for run in range(episodes):
-                theatre.play(job(plan, run))
+                runner.play(job(plan, run))
             whole = time.process_time() - begun
         shares = (f"{100 * spent[part] / whole:11.2f} %" for part in PARTS)
         print(f"{network:12}", *shares, f"{1e3 * whole / episodes:15.1f}")

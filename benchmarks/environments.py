@@ -1,4 +1,4 @@
-"""Steps per second of the environments beside ``simulator.play``, for the same episodes.
+"""Steps per second of the environments beside ``loop.play``, for the same episodes.
 
     python benchmarks/environments.py [--net FILE] [--agent NAME] [--episodes N]
 
@@ -20,12 +20,12 @@ from typing import Any
 import numpy as np
 
 from cavsumo.agents import AGENTS, Agent
-from cavsumo.bodies import Action, kind_named
 from cavsumo.envs.tester import TesterEnv
-from cavsumo.jobs import episode_seed
-from cavsumo.simulator import Performance
-from cavsumo.snapshot import Snapshot
-from cavsumo.stage import Stage, set_stage
+from cavsumo.model.bodies import Action, kind_named
+from cavsumo.model.seeds import episode_seed
+from cavsumo.model.snapshot import Snapshot
+from cavsumo.simulation.loop import EpisodeLoop
+from cavsumo.simulation.setup import Setup, make_setup
 
 ROOT = Path(__file__).resolve().parent.parent
 ROUNDS = 3  # the fastest counts
@@ -57,13 +57,13 @@ def main() -> None:
     here = TesterEnv(net=options.net, until="verdict")
     elsewhere = TesterEnv(net=options.net, until="verdict", process="own")
     held = TesterEnv(net=options.net, until="verdict", hold=HOLD)
-    stage = set_stage(here.setting.plan.scenario, here.setting.site)
-    noted = {seed: note(stage, options.agent, seed) for seed in seeds}
+    setup = make_setup(here.prepared.plan.scenario, here.prepared.site)
+    noted = {seed: note(setup, options.agent, seed) for seed in seeds}
     names = ("play", "env", f"env, hold={HOLD}", "env, own process")
     spent, steps = dict.fromkeys(names, 0.0), dict.fromkeys(names, 0)
     for seed, actions in noted.items():
         ways: dict[str, Callable[[], tuple[float, int]]] = {
-            "play": lambda a=actions, s=seed: play_seconds(stage, a, s),
+            "play": lambda a=actions, s=seed: play_seconds(setup, a, s),
             "env": lambda a=actions, s=seed: env_seconds(here, a, s),
             f"env, hold={HOLD}": lambda a=actions, s=seed: env_seconds(held, a[::HOLD], s),
             "env, own process": lambda a=actions, s=seed: env_seconds(elsewhere, a, s),
@@ -71,7 +71,7 @@ def main() -> None:
         for name, way in ways.items():
             seconds, count = min(way() for _ in range(ROUNDS))
             spent[name], steps[name] = spent[name] + seconds, steps[name] + count
-    for closed in (here, elsewhere, held, stage):
+    for closed in (here, elsewhere, held, setup):
         closed.close()
     net, total = Path(options.net).name, steps["play"]
     print(f"{net}, {options.agent}, {options.episodes} episodes, {total} timesteps")
@@ -80,7 +80,7 @@ def main() -> None:
         print(f"{name:18} {rate:7.0f} timesteps/s  {rate / rates['play']:5.2f} of play")
 
 
-def note(stage: Stage, agent: str, seed: int) -> Actions:
+def note(setup: Setup, agent: str, seed: int) -> Actions:
     """The actions of an agent that owns all bodies, in an episode."""
     player = AGENTS.make(agent, {})
     choose, noted = player.choose_action, []
@@ -90,24 +90,24 @@ def note(stage: Stage, agent: str, seed: int) -> Actions:
         return noted[-1]
 
     player.choose_action = noting  # type: ignore[method-assign]
-    performance = Performance(stage, [player], seed)
-    while not performance.over:
-        performance.step()
+    loop = EpisodeLoop(setup, [player], seed)
+    while not loop.over:
+        loop.step()
     return noted
 
 
-def play_seconds(stage: Stage, actions: Actions, seed: int) -> tuple[float, int]:
+def play_seconds(setup: Setup, actions: Actions, seed: int) -> tuple[float, int]:
     """How long the simulator takes, and for how many timesteps."""
-    performance = Performance(stage, [Told(actions)], seed)
+    loop = EpisodeLoop(setup, [Told(actions)], seed)
     begun = time.perf_counter()
-    while not performance.over:
-        performance.step()
+    while not loop.over:
+        loop.step()
     return time.perf_counter() - begun, len(actions)
 
 
 def env_seconds(env: TesterEnv, actions: Actions, seed: int) -> tuple[float, int]:
     """How long an environment takes, and for how many timesteps."""
-    kind = kind_named(env.setting.plan.scenario.kind)
+    kind = kind_named(env.prepared.plan.scenario.kind)
     limits = np.array([kind.throttle_max, kind.steering_max] * len(actions[0]))
     scaled = [np.array(joint).reshape(-1) / limits for joint in actions]
     env.reset(seed=seed)

@@ -23,13 +23,14 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
+from cavsumo.agents.casting import make_agents
+from cavsumo.batch.prepared import prepare
 from cavsumo.egos import Acceleration, Ego, make_ego
-from cavsumo.egos.protocol import Observations, hello
-from cavsumo.jobs import episode_seed, make_agents
-from cavsumo.scenario import plan_from
-from cavsumo.setting import prepare
-from cavsumo.simulator import play
-from cavsumo.stage import set_stage
+from cavsumo.egos.external.protocol import Observations, hello
+from cavsumo.model.scenario import plan_from
+from cavsumo.model.seeds import episode_seed
+from cavsumo.simulation.loop import play
+from cavsumo.simulation.setup import make_setup
 
 ROOT = Path(__file__).resolve().parent.parent
 EXAMPLE = ROOT / "examples" / "egos" / "stop_for_pedestrians.py"
@@ -87,24 +88,24 @@ def main() -> None:
     plan = plan_from({"net": options.net, "trace": "none"}, "external")
     site = prepare(plan).site
     with forms() as egos:
-        stages = {name: set_stage(plan.scenario, site, Timed(ego)) for name, ego in egos.items()}
-        for stage in stages.values():
-            stage.ego.prepare(stage.mission)
+        stages = {name: make_setup(plan.scenario, site, Timed(ego)) for name, ego in egos.items()}
+        for setup in stages.values():
+            setup.ego.prepare(setup.mission)
         spent: dict[str, list[float]] = {name: [] for name in stages}
         steps = 0
         for i in range(options.episodes):
             seed, found = episode_seed(plan.seed, i), set()
-            for name, stage in stages.items():
+            for name, setup in stages.items():
                 begun = time.perf_counter()
-                episode = play(stage, make_agents(plan, "timing"), seed)
+                episode = play(setup, make_agents(plan, "timing"), seed)
                 spent[name].append((time.perf_counter() - begun) / episode.steps)
                 found.add((episode.judgement, episode.steps, episode.contacts.min_gap))
             assert len(found) == 1, f"episode {i} differs: {found}"
             steps += episode.steps
         report(spent, stages, steps)
         parts(stages["exec, Python"])
-        for stage in stages.values():
-            stage.ego.close()
+        for setup in stages.values():
+            setup.ego.close()
 
 
 def report(spent: dict[str, list[float]], stages: dict[str, Any], steps: int) -> None:
@@ -114,18 +115,18 @@ def report(spent: dict[str, list[float]], stages: dict[str, Any], steps: int) ->
     print("medians          us a timestep   answering   more than the class   of its timestep")
     usual = statistics.median(spent["class"])
     called = statistics.median(stages["class"].ego.times)
-    for name, stage in stages.items():
-        answering = statistics.median(stage.ego.times)
+    for name, setup in stages.items():
+        answering = statistics.median(setup.ego.times)
         print(
             f"{name:16} {1e6 * statistics.median(spent[name]):13.0f} {1e6 * answering:11.0f} "
             f"{1e6 * (answering - called):21.0f} {(answering - called) / usual:17.1%}"
         )
 
 
-def parts(stage: Any) -> None:
+def parts(setup: Any) -> None:
     """Where the time of an exchange goes."""
-    seen = stage.ego.seen[:: max(1, len(stage.ego.seen) // 1000)]
-    writer: Observations = stage.ego.ego._observations
+    seen = setup.ego.seen[:: max(1, len(setup.ego.seen) // 1000)]
+    writer: Observations = setup.ego.ego._observations
     lines = [writer.line(s) for s in seen]
     print(
         f"an observation has {statistics.mean(map(len, lines)):.0f} bytes, "
@@ -133,12 +134,12 @@ def parts(stage: Any) -> None:
         f"writing it takes {microseconds(seen, writer.line):.0f} us"
     )
     driver = AsClass().example.Driver()
-    driver.answer(json.loads(hello(stage.mission, stage.ego.kind)))
+    driver.answer(json.loads(hello(setup.mission, setup.ego.kind)))
     work = microseconds(lines, lambda line: json.dumps(driver.answer(json.loads(line))))
     print(f"reading it, deciding and answering takes Python {work:.0f} us")
     answers = '{"type": "hello", "version": 1}', '{"type": "ready", "acceleration": 0}'
     ego = make_ego(f"exec:{sys.executable} -c \"{ECHO}\" '{answers[0]}' '{answers[1]}'", {})
-    ego.prepare(stage.mission)
+    ego.prepare(setup.mission)
     ask = ego._link.ask
     print(f"its exchange with a program that looks at nothing: "
           f"{microseconds(lines, lambda line: ask(line, 1.0)):.0f} us")  # fmt: skip

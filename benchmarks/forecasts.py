@@ -14,13 +14,13 @@ from collections import Counter
 
 import cav_gym
 
-from cavsumo.batch import run_batch
-from cavsumo.executors import local_executor
-from cavsumo.outcomes import Row, is_test
-from cavsumo.scenario import plan_from
-from cavsumo.setting import Setting, prepare
-from cavsumo.statistics import rate
-from cavsumo.summary import interval, percent
+from cavsumo.batch.dispatch import run_batch
+from cavsumo.batch.executors import local_executor
+from cavsumo.batch.prepared import PreparedBatch, prepare
+from cavsumo.batch.summary import interval, percent
+from cavsumo.model.scenario import plan_from
+from cavsumo.results.rows import Row, is_test
+from cavsumo.results.statistics import rate
 
 
 def main() -> None:
@@ -30,12 +30,12 @@ def main() -> None:
     parser.add_argument("--timing-runs", type=int, default=200)
     parser.add_argument("-j", "--jobs", type=int, default=1)
     options = parser.parse_args()
-    made = setting("expectiminimax", options.runs, {"against": "constant"})
+    made = prepared("expectiminimax", options.runs, {"against": "constant"})
     rows = play(made, options.jobs)
     possible = [cav_gym.forceable_episode(made.plan, made.site, run) for run in range(options.runs)]
     table(rows, possible)
     if options.timing_runs:
-        theirs = play(setting("timing", options.timing_runs, {}), options.jobs)
+        theirs = play(prepared("timing", options.timing_runs, {}), options.jobs)
         both = list(zip(theirs, rows, strict=False))
         print(
             f"tests in the first {len(both)} starts: timing {sum(is_test(a) for a, _ in both)}, "
@@ -43,13 +43,13 @@ def main() -> None:
         )
 
 
-def setting(agent: str, runs: int, params: dict[str, str]) -> Setting:
+def prepared(agent: str, runs: int, params: dict[str, str]) -> PreparedBatch:
     """The plan of one agent, ready to be played."""
     own = {"testers": 1, "agents": (agent,), "runs": runs, "params": params, "reference": "none"}
     return prepare(plan_from(cav_gym.SETTINGS | own, "forecasts"))
 
 
-def play(made: Setting, jobs: int) -> list[Row]:
+def play(made: PreparedBatch, jobs: int) -> list[Row]:
     """The rows of a batch."""
     with local_executor(jobs) as executor:
         return [outcome.row for outcome, _ in run_batch(made, executor, made.plan.todo())]

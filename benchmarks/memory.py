@@ -20,12 +20,12 @@ from typing import Any
 
 from chaos import children
 
-from cavsumo.jobs import head
-from cavsumo.outcomes import Outcome
-from cavsumo.recorder import Recorder
-from cavsumo.scenario import plan_from
-from cavsumo.session import Session
-from cavsumo.setting import manifest, prepare
+from cavsumo.batch.batch_run import BatchRun
+from cavsumo.batch.jobs import head
+from cavsumo.batch.prepared import manifest, prepare
+from cavsumo.model.scenario import plan_from
+from cavsumo.results.rows import Outcome
+from cavsumo.results.writing import Recorder
 
 NET = Path(__file__).resolve().parent.parent / "networks" / "pedestrians.net.xml"
 
@@ -33,10 +33,10 @@ NET = Path(__file__).resolve().parent.parent / "networks" / "pedestrians.net.xml
 class Stubs(Executor):
     """Plays nothing: every episode is a test at once."""
 
-    def submit(self, _: Any, setting: Any, jobs: Any) -> Future[Any]:  # type: ignore[override]
+    def submit(self, _: Any, prepared: Any, jobs: Any) -> Future[Any]:  # type: ignore[override]
         future: Future[Any] = Future()
         made = {"outcome": "held", "trigger_time_s": 1.0 + jobs[0].run % 97 / 10, "wall_s": 0.0}
-        future.set_result([(Outcome(head(setting.plan, job) | made), None) for job in jobs])
+        future.set_result([(Outcome(head(prepared.plan, job) | made), None) for job in jobs])
         return future
 
 
@@ -53,22 +53,24 @@ def main() -> None:
 
 def stubs(episodes: int, file: Path) -> None:
     """A batch of stubs in this process."""
-    setting = prepare(plan_from({"net": NET, "agents": ["noop"], "runs": episodes}, "memory"))
+    prepared = prepare(plan_from({"net": NET, "agents": ["noop"], "runs": episodes}, "memory"))
     played = 0
 
     def stopped() -> bool:
         nonlocal played
-        if session.tally.rows >= played:
-            print(f"{session.tally.rows:7} stubs:    parent {resident('self'):6.1f} MB", flush=True)
+        if batch_run.tally.rows >= played:
+            print(
+                f"{batch_run.tally.rows:7} stubs:    parent {resident('self'):6.1f} MB", flush=True
+            )
             played = {0: episodes // 100, episodes // 100: episodes // 10}.get(played, episodes)
         return False
 
     with Recorder(file) as recorder:
-        session = Session(setting, recorder, Stubs(), 2, stopped)
-        session.begin(manifest(setting))
-        session.play()
-        session.end()
-    print(f"{session.tally.rows:7} stubs:    parent {resident('self'):6.1f} MB")
+        batch_run = BatchRun(prepared, recorder, Stubs(), 2, stopped)
+        batch_run.begin(manifest(prepared))
+        batch_run.play()
+        batch_run.end()
+    print(f"{batch_run.tally.rows:7} stubs:    parent {resident('self'):6.1f} MB")
 
 
 def real(episodes: int, file: Path) -> None:

@@ -16,12 +16,12 @@ from typing import Any
 
 from playwright.sync_api import sync_playwright
 
-from cavsumo.checked import Manner
-from cavsumo.commands.run import run
-from cavsumo.executors import Means
-from cavsumo.player.page import write_page
-from cavsumo.replays import recorded
-from cavsumo.setting import prepare
+from cavsumo.batch.executors import Means
+from cavsumo.batch.preflight import Manner
+from cavsumo.batch.prepared import prepare
+from cavsumo.batch.replay import recorded
+from cavsumo.cli.commands.run import run
+from cavsumo.report.pages.replay.page import write_page
 
 ROOT = Path(__file__).resolve().parent.parent
 SETTINGS: dict[str, Any] = {

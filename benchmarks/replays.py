@@ -19,14 +19,14 @@ from collections import Counter
 from pathlib import Path
 from typing import Any
 
-from cavsumo.checked import Manner
-from cavsumo.commands.run import run
+from cavsumo.batch.executors import Means
+from cavsumo.batch.preflight import Manner
+from cavsumo.batch.prepared import prepare
+from cavsumo.batch.replay import compare, recorded, recorded_alone, replayed
+from cavsumo.batch.worker import Worker
+from cavsumo.cli.commands.run import run
 from cavsumo.errors import DivergenceError
-from cavsumo.executors import Means
-from cavsumo.replays import compare, recorded, recorded_alone, replayed
-from cavsumo.results import read_rows
-from cavsumo.setting import prepare
-from cavsumo.worker import Worker
+from cavsumo.results.reading import read_rows
 
 ROOT = Path(__file__).resolve().parent.parent
 LEARNING = "q-learning"  # replayed from the results, its every earlier episode is played again

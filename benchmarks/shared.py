@@ -19,12 +19,12 @@ from pathlib import Path
 
 from throughput import bare_loop, to_bare
 
-from cavsumo import simulator
-from cavsumo.jobs import Job, job
-from cavsumo.outcomes import is_test
-from cavsumo.scenario import SHARED_BY, plan_from
-from cavsumo.setting import prepare
-from cavsumo.theatre import Theatre
+from cavsumo.batch.episode_runner import EpisodeRunner
+from cavsumo.batch.jobs import Job, job
+from cavsumo.batch.prepared import prepare
+from cavsumo.model.scenario import SHARED_BY, plan_from
+from cavsumo.results.rows import is_test
+from cavsumo.simulation import loop
 
 ROOT = Path(__file__).resolve().parent.parent
 
@@ -44,17 +44,17 @@ def main() -> None:
         given | {"trace": "none", "ego_params": ego, "runs": options.blocks * SHARED_BY}, "shared"
     )
     spent, steps, found, confirmed = Counter[str](), Counter[str](), 0, 0
-    with Theatre(plan, prepare(plan).site) as theatre:
+    with EpisodeRunner(plan, prepare(plan).site) as runner:
         for block in range(options.blocks):
             jobs = [job(plan, block * SHARED_BY + i) for i in range(SHARED_BY)]
-            bare(theatre, jobs, spent, steps)
-            play(theatre, jobs, "fresh", spent, steps)
+            bare(runner, jobs, spent, steps)
+            play(runner, jobs, "fresh", spent, steps)
             shared = [dataclasses.replace(j, simulation="same" if i else "new")
                       for i, j in enumerate(jobs)]  # fmt: skip
-            hits = play(theatre, shared, "search", spent, steps)
+            hits = play(runner, shared, "search", spent, steps)
             again = [j for j, hit in zip(jobs, hits, strict=True) if hit]
             found += len(again)
-            confirmed += sum(play(theatre, again, "confirmation", spent, steps))
+            confirmed += sum(play(runner, again, "confirmation", spent, steps))
     episodes = options.blocks * SHARED_BY
     print(f"{plan.scenario.name}, {options.agent}, {options.testers} testers, {episodes} episodes")
     for name in ("bare", "fresh", "search"):
@@ -75,23 +75,23 @@ def report(name: str, seconds: float, bare: float, episodes: int, steps: Counter
     )
 
 
-def bare(theatre: Theatre, jobs: list[Job], spent: Counter[str], steps: Counter[str]) -> None:
+def bare(runner: EpisodeRunner, jobs: list[Job], spent: Counter[str], steps: Counter[str]) -> None:
     """The bare loop along the tracks of the fresh episodes."""
     for one in jobs:
-        frames = simulator.play(theatre.stage, theatre._cast(one), one.seed, record=True).frames
+        frames = loop.play(runner.setup, runner._cast(one), one.seed, record=True).frames
         tracks = [[to_bare(t) for t in s.testers] for s in frames]
         begun = time.perf_counter()
-        bare_loop(theatre.stage.world, one.seed, tracks)
+        bare_loop(runner.setup.world, one.seed, tracks)
         spent["bare"] += time.perf_counter() - begun  # type: ignore[assignment]
         steps["bare"] += len(tracks) - 1
 
 
 def play(
-    theatre: Theatre, jobs: list[Job], name: str, spent: Counter[str], steps: Counter[str]
+    runner: EpisodeRunner, jobs: list[Job], name: str, spent: Counter[str], steps: Counter[str]
 ) -> list[bool]:
     """Play jobs; which of them were tests."""
     begun = time.perf_counter()
-    rows = [theatre.play(one)[0].row for one in jobs]
+    rows = [runner.play(one)[0].row for one in jobs]
     spent[name] += time.perf_counter() - begun  # type: ignore[assignment]
     steps[name] += sum(row["steps"] for row in rows)
     return [is_test(row) for row in rows]

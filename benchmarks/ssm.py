@@ -4,7 +4,8 @@
 
 The ego follows a vehicle that slows down, on a straight road; then ways cross at a junction, both
 vehicles at 8 m/s, so that the other comes to the place some seconds before the ego or after it.
-All are SUMO's. The device measures along lanes, cavsumo boxes on the plane (``criticality``).
+All are SUMO's. The device measures along lanes, cavsumo (``criticality_monitor``) boxes on the
+plane.
 """
 
 from __future__ import annotations
@@ -17,15 +18,15 @@ from xml.etree import ElementTree
 
 import libsumo
 
-from cavsumo.bodies import CAR, Body
-from cavsumo.contacts import ContactMonitor
-from cavsumo.criticality import Course
-from cavsumo.roads import Approach
-from cavsumo.scenario import plan_from
-from cavsumo.setting import prepare
-from cavsumo.site import Site
-from cavsumo.snapshot import BodyState, Snapshot
-from cavsumo.sumo_poses import from_sumo
+from cavsumo.assertions.contacts import ContactMonitor
+from cavsumo.assertions.criticality_monitor import CriticalityMonitor
+from cavsumo.batch.prepared import prepare
+from cavsumo.model.bodies import CAR, Body
+from cavsumo.model.carriageway import Approach
+from cavsumo.model.scenario import plan_from
+from cavsumo.model.snapshot import BodyState, Snapshot
+from cavsumo.network.site import Site
+from cavsumo.sumo.poses import from_sumo
 
 NETWORKS = Path(__file__).parents[1] / "networks"
 STRAIGHT, JUNCTION = NETWORKS / "pedestrians.net.xml", NETWORKS / "junction.net.xml"
@@ -35,7 +36,7 @@ TYPE = (
     '<vType id="car" length="4.5" width="1.75" sigma="0" minGap="0.5" tau="0.5" decel="9" '
     'emergencyDecel="9" speedDev="0"/>'
 )
-Found = tuple[Course, Mapping[str, str]]
+Found = tuple[CriticalityMonitor, Mapping[str, str]]
 
 
 def state(name: str) -> BodyState:
@@ -68,17 +69,17 @@ def play(net: Path, folder: Path, vehicles: str, act: Callable[[int], None]) -> 
     words = ["sumo", "-n", str(net), "-r", str(routes), "--step-length", str(DT), "--no-step-log"]
     words += ["--no-warnings", "--collision.action", "warn", "--collision.check-junctions"]
     libsumo.start(words)
-    course, monitor = Course(), ContactMonitor()
+    criticality, monitor = CriticalityMonitor(), ContactMonitor()
     for step in range(400):
         libsumo.simulationStep()
         act(step)
         if {"ego", "other"} <= set(libsumo.vehicle.getIDList()):
             seen = Snapshot(step, step * DT, state("ego"), 0.0, (state("other"),))
-            course.observe(seen, monitor.observe(seen))
+            criticality.observe(seen, monitor.observe(seen))
     libsumo.close()
     conflict = ElementTree.parse(folder / "ssm.xml").getroot().find("conflict")
     assert conflict is not None
-    return course, {e.tag: e.get("value", "") for e in conflict if e.tag in MEASURES}
+    return criticality, {e.tag: e.get("value", "") for e in conflict if e.tag in MEASURES}
 
 
 def follow(folder: Path, gap: float) -> Found:
@@ -120,8 +121,8 @@ def cross(folder: Path, site: Site, way: Approach, ahead: float) -> Found:
 
 def line(label: str, found: Found) -> None:
     """The extremes of both, theirs behind ours."""
-    course, device = found
-    ours = (f"{x:.3f}" if math.isfinite(x) else "none" for x in course.extremes())
+    criticality, device = found
+    ours = (f"{x:.3f}" if math.isfinite(x) else "none" for x in criticality.extremes())
     cells = [f"{a:>7} {device[name]:>7}" for a, name in zip(ours, MEASURES, strict=True)]
     print(f"{label:30}", *cells, sep="  ")
 

@@ -27,14 +27,14 @@ from xml.etree import ElementTree
 
 import libsumo
 
-import cavsumo.simulator as simulator
-from cavsumo.jobs import job
-from cavsumo.network import read_network
-from cavsumo.scenario import plan_from
-from cavsumo.setting import prepare
-from cavsumo.sumo_poses import to_sumo
-from cavsumo.theatre import Theatre
-from cavsumo.world import KEEP_EXACT, MATCH_M, UNSAFE, World
+from cavsumo.batch.episode_runner import EpisodeRunner
+from cavsumo.batch.jobs import job
+from cavsumo.batch.prepared import prepare
+from cavsumo.model.scenario import plan_from
+from cavsumo.network.reader import read_network
+from cavsumo.simulation import loop
+from cavsumo.sumo.poses import to_sumo
+from cavsumo.sumo.world import KEEP_EXACT, MATCH_M, UNSAFE, World
 
 ROOT = Path(__file__).resolve().parent.parent
 
@@ -57,9 +57,9 @@ def main() -> None:
             demand = plan_from(given, "benchmark").scenario.routes
             given["routes"] = str(wanderers(options.net, demand, options.cars, Path(folder)))
         plan = plan_from(given, "benchmark")
-        with Theatre(plan, prepare(plan).site) as theatre:
-            spent = compare(theatre, options.episodes)
-            shares = parts(theatre, options.episodes)
+        with EpisodeRunner(plan, prepare(plan).site) as runner:
+            spent = compare(runner, options.episodes)
+            shares = parts(runner, options.episodes)
     print(
         f"{plan.scenario.name}, {options.agent}, {options.testers} testers, "
         f"{options.episodes} episodes, {spent.steps} steps, "
@@ -123,24 +123,24 @@ def wanderers(net: str, demand: Path | None, cars: int, folder: Path) -> Path:
     return folder / "cars.rou.xml"
 
 
-def compare(theatre: Theatre, episodes: int) -> Spent:
+def compare(runner: EpisodeRunner, episodes: int) -> Spent:
     """What cavsumo and the bare loop need for the same episodes.
 
     Each episode is played three times by each, in turns; the fastest counts, so that what else the
     machine does weighs less.
     """
     spent = Spent()
-    world = theatre.stage.world
+    world = runner.setup.world
     for run in range(episodes):
-        one = job(theatre.plan, run)
-        agents = theatre._cast(one)
-        recorded = simulator.play(theatre.stage, agents, one.seed, record=True).frames
+        one = job(runner.plan, run)
+        agents = runner._cast(one)
+        recorded = loop.play(runner.setup, agents, one.seed, record=True).frames
         tracks = [[to_bare(t) for t in s.testers] for s in recorded]
         spent.present += [len(s.raw_background) for s in recorded]
         del recorded
         ours, theirs = [], []
         for _ in range(3):
-            ours.append(our_seconds(theatre, agents, one.seed))
+            ours.append(our_seconds(runner, agents, one.seed))
             begun = time.perf_counter()
             restarted = bare_loop(world, one.seed, tracks)
             theirs.append((time.perf_counter() - begun, restarted - begun))
@@ -155,9 +155,9 @@ def compare(theatre: Theatre, episodes: int) -> Spent:
     return spent
 
 
-def our_seconds(theatre: Theatre, agents: list[Any], seed: int) -> tuple[float, float]:
+def our_seconds(runner: EpisodeRunner, agents: list[Any], seed: int) -> tuple[float, float]:
     """How long cavsumo plays an episode, and how long of that it restarts."""
-    restart, ended = simulator._reset, 0.0
+    restart, ended = loop._reset, 0.0
 
     def clocked(*args: Any) -> Any:
         nonlocal ended
@@ -165,11 +165,11 @@ def our_seconds(theatre: Theatre, agents: list[Any], seed: int) -> tuple[float, 
         ended = time.perf_counter()
         return result
 
-    simulator._reset = clocked
+    loop._reset = clocked
     begun = time.perf_counter()
-    simulator.play(theatre.stage, agents, seed)
+    loop.play(runner.setup, agents, seed)
     whole = time.perf_counter() - begun
-    simulator._reset = restart
+    loop._reset = restart
     return whole, ended - begun
 
 
@@ -228,7 +228,7 @@ def insert(world: World, track: list[Any]) -> None:
         libsumo.vehicle.add(name, "cavsumo_tester", typeID="cavsumo_pedestrian")
 
 
-def parts(theatre: Theatre, episodes: int) -> list[tuple[str, float]]:
+def parts(runner: EpisodeRunner, episodes: int) -> list[tuple[str, float]]:
     """Share of each part in an episode, with a clock around each call."""
     spent: dict[str, float] = defaultdict(float)
 
@@ -242,23 +242,23 @@ def parts(theatre: Theatre, episodes: int) -> list[tuple[str, float]]:
 
         return timed
 
-    world, stage = theatre.stage.world, theatre.stage
-    originals = (simulator._observe, simulator._moved)
+    world, setup = runner.setup.world, runner.setup
+    originals = (loop._observe, loop._moved)
     world.reset = clocked("restart SUMO", world.reset)  # type: ignore[method-assign]
     world._snapshot = clocked("read SUMO", world._snapshot)  # type: ignore[method-assign]
     world._place = clocked("tell SUMO (moveToXY)", world._place)  # type: ignore[method-assign]
     world.step = clocked("step SUMO", world.step)  # type: ignore[method-assign]
-    simulator._observe = clocked("contacts and assertions", simulator._observe)
-    simulator._moved = clocked("kinematics", simulator._moved)
+    loop._observe = clocked("contacts and assertions", loop._observe)
+    loop._moved = clocked("kinematics", loop._moved)
     begun = time.perf_counter()
     for run in range(episodes):
-        one = job(theatre.plan, run)
-        agents = theatre._cast(one)
+        one = job(runner.plan, run)
+        agents = runner._cast(one)
         for agent in agents:
             agent.choose_action = clocked("agents", type(agent).choose_action.__get__(agent))  # type: ignore[method-assign]
-        simulator.play(stage, agents, one.seed)
+        loop.play(setup, agents, one.seed)
     total = time.perf_counter() - begun
-    simulator._observe, simulator._moved = originals
+    loop._observe, loop._moved = originals
     spent["step SUMO"] -= spent["read SUMO"] + spent["tell SUMO (moveToXY)"]
     spent["the rest"] = total - sum(spent.values())
     return sorted(((k, v / total) for k, v in spent.items()), key=lambda kv: -kv[1])

@@ -18,7 +18,7 @@ from tables import cell_of, headed, line, named, plain, span, write_tables
 
 from cavsumo.report.analysis import Report, analyse
 from cavsumo.report.rates import Rates, share
-from cavsumo.results import read_rows
+from cavsumo.results.reading import read_rows
 
 Costs = dict[tuple[str, int, str], list[float]]
 

@@ -16,11 +16,11 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+from cavsumo.batch.summary import interval, percent
 from cavsumo.report.analysis import Report, analyse
-from cavsumo.report.compare import Comparison
+from cavsumo.report.compare import PairedComparison
 from cavsumo.report.rates import WILSON, Rates, Share
-from cavsumo.statistics import rate
-from cavsumo.summary import interval, percent
+from cavsumo.results.statistics import rate
 
 HERE = Path(__file__).resolve().parent
 PLACES = ("straight", "crossing", "timegap", "junction")
@@ -136,12 +136,12 @@ def ratios(report: Report) -> Iterator[str]:
         yield line([place, str(n), *cells])
 
 
-def with_basis(report: Report) -> Iterator[Comparison]:
+def with_basis(report: Report) -> Iterator[PairedComparison]:
     """The comparisons of tests with those of the programmed random tester."""
     return (c for c in report.comparisons if c.event == "tests" and c.second == BASIS)
 
 
-def ratio_of(one: Comparison) -> str:
+def ratio_of(one: PairedComparison) -> str:
     """A ratio, bold where it is another than 1 for sure."""
     if one.ratio is None or one.interval is None:
         return ""
@@ -177,7 +177,9 @@ def figures(report: Report) -> str:
     return text.getvalue()
 
 
-def row_of(one: Rates, per_second: float | None, compared: Comparison | None) -> dict[str, Any]:
+def row_of(
+    one: Rates, per_second: float | None, compared: PairedComparison | None
+) -> dict[str, Any]:
     """One line of it."""
     place, testers = named(one.setting)
     row: dict[str, Any] = {"place": place, "testers": testers, "agent": one.agent}

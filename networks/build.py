@@ -22,7 +22,8 @@ from xml.sax.saxutils import quoteattr
 
 import sumolib
 
-from cavsumo.netconvert import (
+from cavsumo.network.osm.extract import find_roads, write_roads
+from cavsumo.network.osm.netconvert import (
     ODBL,
     OSM_OPTIONS,
     netconvert,
@@ -30,7 +31,6 @@ from cavsumo.netconvert import (
     typemap_option,
     with_notice,
 )
-from cavsumo.osm import find_roads, write_roads
 
 NETWORKS = Path(__file__).resolve().parent
 ROUTES = NETWORKS.parent / "routes"

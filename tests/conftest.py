@@ -15,21 +15,22 @@ from shapely.geometry import LineString, box
 from support import CHROMIUM, LAPTOP, OPTIONS
 
 from cavsumo.agents.base import Scene
-from cavsumo.bodies import PEDESTRIAN, Body, Kind
+from cavsumo.batch.episode_runner import EpisodeRunner
+from cavsumo.batch.jobs import job
+from cavsumo.batch.prepared import PreparedBatch, prepare
+from cavsumo.batch.replay import Record
 from cavsumo.cli import main
 from cavsumo.egos import make_ego
 from cavsumo.egos.base import EGO_KIND
-from cavsumo.jobs import job
-from cavsumo.paths import Path as Polyline
-from cavsumo.replays import Record
-from cavsumo.roads import Roads, Start
-from cavsumo.scenario import BatchPlan, plan_from
-from cavsumo.setting import Setting, checksums, prepare, versions
-from cavsumo.site import Site
-from cavsumo.snapshot import BodyState, Snapshot
-from cavsumo.theatre import Theatre
-from cavsumo.traces import Trace, parsed
-from cavsumo.world import World
+from cavsumo.model.bodies import PEDESTRIAN, Body, Kind
+from cavsumo.model.carriageway import Roads, Start
+from cavsumo.model.polyline import Path as Polyline
+from cavsumo.model.scenario import BatchPlan, plan_from
+from cavsumo.model.snapshot import BodyState, Snapshot
+from cavsumo.network.site import Site
+from cavsumo.results.provenance import checksums, versions
+from cavsumo.results.traces import Trace, parsed
+from cavsumo.sumo.world import World
 
 ROOT = Path(__file__).parents[1]
 NAMES = ("crossing", "junction", "pedestrians")
@@ -69,7 +70,7 @@ def staged(networks: dict[str, Path]) -> Callable[..., tuple[BatchPlan, Site]]:
     """
     sites: dict[tuple[Any, ...], Site] = {}
 
-    def stage(name: str = "pedestrians", **settings: Any) -> tuple[BatchPlan, Site]:
+    def setup(name: str = "pedestrians", **settings: Any) -> tuple[BatchPlan, Site]:
         chosen = {"net": networks[name], "routes": "none"} | settings
         if chosen["routes"] == "auto":
             del chosen["routes"]
@@ -83,16 +84,16 @@ def staged(networks: dict[str, Path]) -> Callable[..., tuple[BatchPlan, Site]]:
             sites[key] = prepare(plan).site
         return plan, sites[key]
 
-    return stage
+    return setup
 
 
 @pytest.fixture(scope="session")
-def set_up(staged: Callable[..., tuple[BatchPlan, Site]]) -> Callable[..., Setting]:
+def set_up(staged: Callable[..., tuple[BatchPlan, Site]]) -> Callable[..., PreparedBatch]:
     """Call like ``staged`` for all that a process needs to play."""
 
-    def made(name: str = "pedestrians", **settings: Any) -> Setting:
+    def made(name: str = "pedestrians", **settings: Any) -> PreparedBatch:
         plan, site = staged(name, **settings)
-        return Setting(plan, site, str(Path.cwd()), checksums(plan), versions())
+        return PreparedBatch(plan, site, str(Path.cwd()), checksums(plan), versions())
 
     return made
 
@@ -234,8 +235,8 @@ def _start(x: float, y: float, o: float, open_plane: bool) -> Start:
 def shown(staged: Callable[..., tuple[BatchPlan, Site]]) -> tuple[Record, Trace, Site]:
     """An episode at the Helsinki crossing in which the ego hits a tester, recorded."""
     plan, site = staged("crossing", agents=["timing"], routes="auto")
-    with Theatre(plan, site) as theatre:
-        outcome, _ = theatre.play(dataclasses.replace(job(plan, 1), record=True))
+    with EpisodeRunner(plan, site) as runner:
+        outcome, _ = runner.play(dataclasses.replace(job(plan, 1), record=True))
     trace = parsed(outcome.trace)
     return Record(plan, trace.row, trace, trace.head, Path("results.csv")), trace, site
 

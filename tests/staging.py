@@ -11,15 +11,15 @@ import numpy as np
 
 from cavsumo.agents.base import Agent
 from cavsumo.assertions.base import Judgement
-from cavsumo.bodies import Action, Kind, clamped
 from cavsumo.egos.base import Acceleration, Command, Drive, Ego
-from cavsumo.roads import Start
-from cavsumo.scenario import BatchPlan
-from cavsumo.scene import Scene
-from cavsumo.simulator import Episode, play
-from cavsumo.site import Site
-from cavsumo.snapshot import BodyState, Snapshot
-from cavsumo.stage import set_stage
+from cavsumo.model.bodies import Action, Kind, clamped
+from cavsumo.model.carriageway import Start
+from cavsumo.model.scenario import BatchPlan
+from cavsumo.model.scene import Scene
+from cavsumo.model.snapshot import BodyState, Snapshot
+from cavsumo.network.site import Site
+from cavsumo.simulation.loop import Episode, play
+from cavsumo.simulation.setup import make_setup
 
 Speed = Callable[[Snapshot], float | Drive]  # the speed that the ego wants [m/s], or how it steers
 Act = Callable[[Snapshot, BodyState], tuple[float, float]]  # a body's speed [m/s] and steering
@@ -110,10 +110,10 @@ class Stage:
             "end": end,
         }
         scenario = self.plan.scenario.model_copy(update=settings)
-        stage = set_stage(scenario, site, Scripted(ego, start, decel))
-        agents = [Puppet(testers) for _ in stage.teams]
+        setup = make_setup(scenario, site, Scripted(ego, start, decel))
+        agents = [Puppet(testers) for _ in setup.teams]
         try:
-            episode = play(stage, agents, 1)
+            episode = play(setup, agents, 1)
         finally:
-            stage.close()
+            setup.close()
         return episode.judgement, episode

@@ -10,8 +10,8 @@ from concurrent.futures import Executor, Future
 from pathlib import Path
 from typing import Any
 
-from cavsumo.results import read_rows
-from cavsumo.setting import Setting
+from cavsumo.batch.prepared import PreparedBatch
+from cavsumo.results.reading import read_rows
 
 PATIENCE_S = 60.0
 CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser")
@@ -69,7 +69,7 @@ def workers_of(parent: int) -> dict[int, str]:
             fields = (folder / "stat").read_text().rpartition(")")[2].split()
         except OSError:  # gone meanwhile
             continue
-        if int(fields[1]) == parent and b"cavsumo.worker_process" in command:
+        if int(fields[1]) == parent and b"cavsumo.batch.worker_process" in command:
             found[int(folder.name)] = fields[19]
     return found
 
@@ -86,7 +86,7 @@ def alive(pid: int, started: str | None = None) -> bool:
 class Troupe(Executor):
     """Processes that stay for all batches of one setting, whatever their shards and rules."""
 
-    def __init__(self, own: Setting, executor: Executor) -> None:
+    def __init__(self, own: PreparedBatch, executor: Executor) -> None:
         self.own, self.executor = own, executor
 
     def submit(self, fn: Callable[..., Any], /, *args: Any, **kwargs: Any) -> Future[Any]:

@@ -12,10 +12,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from cavsumo.agents import AGENTS, Agent, Scene
-from cavsumo.bodies import KINDS, NOOP, Action, Body, clamped, model_of
 from cavsumo.errors import InputError
-from cavsumo.kinematics import step_floats
-from cavsumo.snapshot import Snapshot
+from cavsumo.model.bodies import KINDS, NOOP, Action, Body, clamped, model_of
+from cavsumo.model.kinematics import step_floats
+from cavsumo.model.snapshot import Snapshot
 
 State = tuple[float, float, float, float]
 MakeScene = Callable[..., Scene]

@@ -14,7 +14,7 @@ import pytest
 from cavsumo.agents import AGENTS, Agent, Scene
 from cavsumo.agents.features import FEATURES
 from cavsumo.errors import InputError
-from cavsumo.snapshot import Snapshot
+from cavsumo.model.snapshot import Snapshot
 
 MakeScene = Callable[..., Scene]
 See = Callable[..., Snapshot]

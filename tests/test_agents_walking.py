@@ -17,13 +17,14 @@ from shapely.geometry import LineString, Polygon, box
 
 from cavsumo.agents import AGENTS, Agent, Scene
 from cavsumo.agents.triggers import Timing
-from cavsumo.bodies import NOOP, PEDESTRIAN, Body
 from cavsumo.egos.base import EGO_KIND
-from cavsumo.geometry import corners, stopping_distances, zone_entered
-from cavsumo.kinematics import step_floats
-from cavsumo.paths import Path
-from cavsumo.roads import Roads, Start
-from cavsumo.snapshot import BodyState, Snapshot
+from cavsumo.model.bodies import NOOP, PEDESTRIAN, Body
+from cavsumo.model.carriageway import Roads, Start
+from cavsumo.model.geometry import corners
+from cavsumo.model.kinematics import step_floats
+from cavsumo.model.polyline import Path
+from cavsumo.model.snapshot import BodyState, Snapshot
+from cavsumo.model.stopping_zones import stopping_distances, zone_entered
 
 State = tuple[float, float, float, float]
 MakeScene = Callable[..., Scene]

@@ -12,16 +12,16 @@ from xml.etree import ElementTree
 import numpy as np
 import pytest
 
-from cavsumo.approaches import approaches
-from cavsumo.bodies import BICYCLE, BUS, CAR, KINDS, Kind
-from cavsumo.ego_routes import derived_routes, given_route
 from cavsumo.egos.base import EGO_KIND
 from cavsumo.errors import NetworkError
-from cavsumo.geometry import Box, gap
-from cavsumo.lane_chains import without_corners
-from cavsumo.network import read_network
-from cavsumo.roads import Approach
-from cavsumo.vehicle_starts import APART_M, draw_vehicles
+from cavsumo.model.bodies import BICYCLE, BUS, CAR, KINDS, Kind
+from cavsumo.model.carriageway import Approach
+from cavsumo.model.geometry import Box, gap
+from cavsumo.network.approaches import approaches
+from cavsumo.network.ego_routes import derived_routes, given_route
+from cavsumo.network.lane_chains import without_corners
+from cavsumo.network.reader import read_network
+from cavsumo.network.vehicle_starts import APART_M, draw_vehicles
 
 QUARTER = " ".join(
     f"{12 - 12 * math.cos(a):.3f},{-12 + 12 * math.sin(a):.3f}"

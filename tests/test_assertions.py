@@ -14,12 +14,12 @@ from hypothesis import strategies as st
 
 from cavsumo.agents.base import Scene
 from cavsumo.assertions import ASSERTIONS, Assertion
-from cavsumo.bodies import CAR, PEDESTRIAN, Body
-from cavsumo.contacts import ContactMonitor
-from cavsumo.kinematics import step_floats
-from cavsumo.paths import Path as Polyline
-from cavsumo.roads import Start
-from cavsumo.snapshot import BodyState, Snapshot
+from cavsumo.assertions.contacts import ContactMonitor
+from cavsumo.model.bodies import CAR, PEDESTRIAN, Body
+from cavsumo.model.carriageway import Start
+from cavsumo.model.kinematics import step_floats
+from cavsumo.model.polyline import Path as Polyline
+from cavsumo.model.snapshot import BodyState, Snapshot
 
 DATA = Path(__file__).parent / "data" / "assertion_vectors.json"
 ZONES = [c for c in json.loads(DATA.read_text())["cases"] if c["metric"] == "cavgym_zones"]

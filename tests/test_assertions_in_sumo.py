@@ -14,10 +14,10 @@ from staging import Stage
 
 from cavsumo.assertions import ASSERTIONS
 from cavsumo.egos.base import Drive
-from cavsumo.roads import Start
-from cavsumo.scenario import BatchPlan
-from cavsumo.site import Site
-from cavsumo.snapshot import BodyState, Snapshot
+from cavsumo.model.carriageway import Start
+from cavsumo.model.scenario import BatchPlan
+from cavsumo.model.snapshot import BodyState, Snapshot
+from cavsumo.network.site import Site
 
 Staged = Callable[..., tuple[BatchPlan, Site]]
 LEFT = math.pi / 2  # across the ego's way
@@ -54,9 +54,9 @@ def straight(staged: Staged) -> Stage:
     return Stage(*staged("pedestrians"))
 
 
-def judged(stage: Stage, verdict: str, name: str, ego: Any, **more: Any) -> None:
+def judged(setup: Stage, verdict: str, name: str, ego: Any, **more: Any) -> None:
     """An episode must come out so, with a robustness that agrees."""
-    said, episode = stage.play(name, ego, **more)
+    said, episode = setup.play(name, ego, **more)
     assert said.verdict == verdict, said
     assert episode.verdicts == {name: verdict}
     SEEN.add((name, verdict))
@@ -108,19 +108,19 @@ def brakes(snapshot: Snapshot, body: BodyState) -> tuple[float, float]:
     return (8.0 if snapshot.time < 1.0 else max(0.0, body.v - 0.6)), 0.0
 
 
-def aside(stage: Stage, along: float = 50.0) -> list[Start]:
+def aside(setup: Stage, along: float = 50.0) -> list[Start]:
     """Somebody who stands on the pavement and looks along it."""
-    return [stage.beside(along, -4.0, 0.0)]
+    return [setup.beside(along, -4.0, 0.0)]
 
 
-def in_lane(stage: Stage, along: float = 60.0) -> list[Start]:
+def in_lane(setup: Stage, along: float = 60.0) -> list[Start]:
     """Somebody who stands in the ego's lane."""
-    return [stage.beside(along, 0.0, LEFT)]
+    return [setup.beside(along, 0.0, LEFT)]
 
 
-def ahead(stage: Stage, along: float) -> list[Start]:
+def ahead(setup: Stage, along: float) -> list[Start]:
     """A car in the ego's lane that drives as fast."""
-    return [stage.beside(along, 0.0, 0.0, 8.0)]
+    return [setup.beside(along, 0.0, 0.0, 8.0)]
 
 
 COMMON = ("stopping-distance", "ttc", "drac", "reaction-zone")
@@ -223,24 +223,24 @@ def zebra(networks: dict[str, Path], folder: Path) -> Path:
 @shows("give-way")
 def test_give_way(staged: Staged, networks: dict[str, Path], tmp_path: Path) -> None:
     """Nobody near the crossing, somebody on it before whom the ego waits, or does not."""
-    stage = Stage(*staged("crossing", net=zebra(networks, tmp_path)))
-    crossing = next(c for c in stage.site.marked if c.begin > 30.0)
+    setup = Stage(*staged("crossing", net=zebra(networks, tmp_path)))
+    crossing = next(c for c in setup.site.marked if c.begin > 30.0)
     assert (crossing.priority, crossing.signalled) == (True, False)
     middle = (crossing.begin + crossing.end) / 2
-    far, near_kerb = stage.beside(10.0, -6.0, LEFT), stage.beside(middle, -2.2, LEFT)
+    far, near_kerb = setup.beside(10.0, -6.0, LEFT), setup.beside(middle, -2.2, LEFT)
 
     def waits(snapshot: Snapshot) -> float:
         ego = snapshot.ego
-        left = crossing.begin - stage.site.route.path.project(ego.x, ego.y).along - 2.5
+        left = crossing.begin - setup.site.route.path.project(ego.x, ego.y).along - 2.5
         return 6.0 if snapshot.time > 16.0 else max(0.0, min(8.0, 0.3 * (left - 1.0)))
 
     def crosses(snapshot: Snapshot, body: BodyState) -> tuple[float, float]:
         return (1.4 if snapshot.time > 8.0 else 0.0), 0.0
 
     rule: dict[str, Any] = {"testers": crosses}
-    judged(stage, "not_triggered", "give-way", steady, places=[far], end=10.0)
-    judged(stage, "held", "give-way", waits, places=[near_kerb], end=25.0, **rule)
-    judged(stage, "violated", "give-way", steady, places=[near_kerb], end=15.0, **rule)
+    judged(setup, "not_triggered", "give-way", steady, places=[far], end=10.0)
+    judged(setup, "held", "give-way", waits, places=[near_kerb], end=25.0, **rule)
+    judged(setup, "violated", "give-way", steady, places=[near_kerb], end=15.0, **rule)
     plain = Stage(*staged("crossing"))
     assert not any(c.priority for c in plain.site.marked)
     judged(plain, "not_triggered", "give-way", steady, places=[near_kerb], end=15.0)
@@ -273,8 +273,8 @@ def test_leaving_the_road(straight: Stage) -> None:
 @pytest.mark.parametrize("way", ["left", "right", "straight"])
 def test_turning_is_not_leaving_the_road(staged: Staged, way: str) -> None:
     """An ego that SUMO steers round a corner stays within the tolerance."""
-    stage = Stage(*staged("junction", ego_route=way))
-    judged(stage, "held", "leaving-the-road", lambda snapshot: 5.0, places=aside(stage, 5.0))
+    setup = Stage(*staged("junction", ego_route=way))
+    judged(setup, "held", "leaving-the-road", lambda snapshot: 5.0, places=aside(setup, 5.0))
 
 
 @shows("standing")

@@ -14,28 +14,33 @@ import pytest
 from support import rows
 
 from cavsumo.agents.base import Agent
-from cavsumo.bodies import Action
+from cavsumo.batch.episode_runner import EpisodeRunner
+from cavsumo.batch.executors import Means
+from cavsumo.batch.jobs import job
 from cavsumo.cli import main
-from cavsumo.commands.run import Manner, run
-from cavsumo.counterfactual import NOT_MONOTONE, Retrial, Verdict, Watch
+from cavsumo.cli.commands.run import Manner, run
 from cavsumo.egos import make_ego
 from cavsumo.egos.base import Ego
-from cavsumo.egos.takeover import Takeover
-from cavsumo.executors import Means
-from cavsumo.jobs import job
-from cavsumo.references import REFERENCES
+from cavsumo.egos.reference import REFERENCES
+from cavsumo.egos.reference.takeover import Takeover
+from cavsumo.model.bodies import Action
+from cavsumo.model.carriageway import Start
+from cavsumo.model.scenario import BatchPlan
+from cavsumo.network.site import Site
 from cavsumo.report.analysis import analyse
-from cavsumo.roads import Start
-from cavsumo.scenario import BatchPlan
-from cavsumo.simulator import Performance, play
-from cavsumo.site import Site
-from cavsumo.stage import Stage, set_stage
-from cavsumo.theatre import Theatre
+from cavsumo.simulation.avoidability import (
+    NOT_MONOTONE,
+    Avoidability,
+    AvoidabilityCheck,
+    ContactWatch,
+)
+from cavsumo.simulation.loop import EpisodeLoop, play
+from cavsumo.simulation.setup import Setup, make_setup
 
 LANE_Y, SPEED, WALK, DT = -1.825, 8.0, 1.4, 0.1
 HALF = 0.328125  # half the length of a pedestrian, half its width is 0.4375 [m]
 Staged = Callable[..., tuple[BatchPlan, Site]]
-Played = Callable[..., Retrial]
+Played = Callable[..., AvoidabilityCheck]
 
 
 @pytest.fixture
@@ -44,31 +49,33 @@ def played(staged: Staged, monkeypatch: pytest.MonkeyPatch) -> Any:
 
     Returns the episode, ready to be tried again with other drivers.
     """
-    open_stages: list[Stage] = []
+    open_stages: list[Setup] = []
 
     def one(
         start: Start, ego: Ego | None = None, agent: Agent | None = None, **asserted: Any
-    ) -> Retrial:
+    ) -> AvoidabilityCheck:
         asserted = asserted or {"assertions": ["collision"]}
         plan, site = staged("pedestrians", testers=1, end=20.0, **asserted)
         ego = ego or make_ego("constant", {"speed": SPEED})
         monkeypatch.setattr(Site, "draw", lambda *_: (start,))
-        stage = set_stage(plan.scenario, site, ego)
-        open_stages.append(stage)
+        setup = make_setup(plan.scenario, site, ego)
+        open_stages.append(setup)
         agents = [agent or Agent()]
-        episode = play(stage, agents, 1, keep=True)
+        episode = play(setup, agents, 1, keep=True)
         assert episode.judgement.verdict == "violated"
-        return Retrial(stage, agents, 1, False, episode, lambda: None)
+        return AvoidabilityCheck(setup, agents, 1, False, episode, lambda: None)
 
     yield one
-    for stage in open_stages:
-        stage.close()
+    for setup in open_stages:
+        setup.close()
 
 
-def judged(retrial: Retrial, name: str) -> Verdict:
+def judged(retrial: AvoidabilityCheck, name: str) -> Avoidability:
     """The verdict of one reference driver."""
-    fresh = Retrial.__new__(Retrial)  # the assertion that was violated has been used since
-    for field in dataclasses.fields(Retrial):
+    fresh = AvoidabilityCheck.__new__(
+        AvoidabilityCheck
+    )  # the assertion that was violated has been used since
+    for field in dataclasses.fields(AvoidabilityCheck):
         object.__setattr__(fresh, field.name, getattr(retrial, field.name))
     return fresh.judged(REFERENCES.make(name, {}))
 
@@ -132,8 +139,8 @@ def test_what_jumps_out_at_the_bumper_nobody_prevents(played: Played) -> None:
     """A pedestrian who grows out of the ground under the bumper: no time for any driver."""
     retrial = played(standing(9.0))
     assert retrial.episode.frames[retrial.end].time < 1.0
-    assert judged(retrial, "human") == Verdict(False)
-    assert judged(retrial, "rss") == Verdict(False)
+    assert judged(retrial, "human") == Avoidability(False)
+    assert judged(retrial, "rss") == Avoidability(False)
 
 
 def test_every_timestep_by_itself_gives_the_same_last_chance(played: Played) -> None:
@@ -209,14 +216,14 @@ def test_an_ego_that_is_never_the_same_is_not_judged(played: Played) -> None:
 def test_sumos_driver_obeys_from_the_takeover_on(staged: Staged) -> None:
     """It drives as it likes before, reaction time and all; then every timestep is commanded."""
     plan, site = staged("pedestrians", testers=1)
-    stage = set_stage(plan.scenario, site)
-    ego = Takeover(stage.ego, REFERENCES.make("ideal", {}), 23, drives=False)
-    with_it = dataclasses.replace(stage, ego=ego, assertions=(Watch(),))
+    setup = make_setup(plan.scenario, site)
+    ego = Takeover(setup.ego, REFERENCES.make("ideal", {}), 23, drives=False)
+    with_it = dataclasses.replace(setup, ego=ego, assertions=(ContactWatch(),))
     try:
-        alone = _speeds(Performance(stage, [Agent()], 5), 40)
-        taken = _speeds(Performance(with_it, [Agent()], 5), 40)
+        alone = _speeds(EpisodeLoop(setup, [Agent()], 5), 40)
+        taken = _speeds(EpisodeLoop(with_it, [Agent()], 5), 40)
     finally:
-        stage.close()
+        setup.close()
     assert taken[:24] == alone[:24]
     assert min(alone[24:]) > 5.0
     lost = [a - b for a, b in itertools.pairwise(taken[23:31])]
@@ -224,12 +231,12 @@ def test_sumos_driver_obeys_from_the_takeover_on(staged: Staged) -> None:
     assert taken[-1] == 0.0
 
 
-def _speeds(performance: Performance, steps: int) -> list[float]:
+def _speeds(loop: EpisodeLoop, steps: int) -> list[float]:
     """The ego's speed at each timestep."""
-    speeds = [performance.snapshot.ego.v]
+    speeds = [loop.snapshot.ego.v]
     for _ in range(steps):
-        performance.step()
-        speeds.append(performance.snapshot.ego.v)
+        loop.step()
+        speeds.append(loop.snapshot.ego.v)
     return speeds
 
 
@@ -269,7 +276,7 @@ def test_a_formula_that_names_nobody_is_asked_again_to_the_end(played: Played) -
 def test_a_formula_broken_from_the_start_nobody_keeps(played: Played) -> None:
     """Its first timestep belongs to the original."""
     retrial = played(standing(), formulas={"slow": "always (speed_mps < 5)"})
-    assert judged(retrial, "ideal") == Verdict(False)
+    assert judged(retrial, "ideal") == Avoidability(False)
 
 
 # In batches
@@ -340,12 +347,12 @@ def test_no_reference_leaves_the_rest_of_the_row_as_it_is(
     """The judgement costs nothing when it is off and changes nothing when it is on."""
     plan, site = staged("pedestrians", **{**BATCH, "reference": "none", "trace": trace})
     number = int(next(row for row in rows(batch) if row["avoidable"])["run"])
-    with Theatre(plan, site) as theatre:
-        without = theatre.play(job(plan, number))[0]
+    with EpisodeRunner(plan, site) as runner:
+        without = runner.play(job(plan, number))[0]
     beats: list[int] = []
     plan = plan.model_copy(update={"reference": "ideal"})
-    with Theatre(plan, site) as theatre:
-        with_it = theatre.play(job(plan, number), lambda: beats.append(1))[0]
+    with EpisodeRunner(plan, site) as runner:
+        with_it = runner.play(job(plan, number), lambda: beats.append(1))[0]
     for name in ("avoidable", "reference", "last_chance_s", "margin_s", "avoidable_note", "wall_s"):
         with_it.row.pop(name, None)
         without.row.pop(name, None)
@@ -392,9 +399,9 @@ def test_a_program_is_relieved_too(staged: Staged, tmp_path: Path) -> None:
     (tmp_path / "blind.py").write_text(BLIND, encoding="utf-8")
     ego = f"exec:{sys.executable} {tmp_path / 'blind.py'}"
     plan, site = staged("pedestrians", **{**BATCH, "ego": ego, "ego_params": {"depart_speed": 7}})
-    with Theatre(plan, site) as theatre:
-        theatre.rehearse()
-        outcome = theatre.play(job(plan, 0))[0]
+    with EpisodeRunner(plan, site) as runner:
+        runner.try_out()
+        outcome = runner.play(job(plan, 0))[0]
     assert outcome.row["outcome"] == "violated", outcome.row.get("error")
     assert (outcome.row["avoidable"], outcome.row["avoidable_note"]) == (1, "")
     assert outcome.ego_log.count("begun") == 1

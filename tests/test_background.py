@@ -13,17 +13,17 @@ import libsumo
 import pytest
 
 from cavsumo.agents.programmed import TimingAgent
-from cavsumo.background import Background, Roaming, roaming
-from cavsumo.bodies import PEDESTRIAN, Body
+from cavsumo.batch.episode_runner import EpisodeRunner
+from cavsumo.batch.jobs import job
 from cavsumo.egos.base import EGO_KIND
 from cavsumo.errors import SimulationError
-from cavsumo.geometry import gap
-from cavsumo.jobs import job
-from cavsumo.scenario import BatchPlan
-from cavsumo.simulator import Episode, play
-from cavsumo.site import Site
-from cavsumo.snapshot import BodyState, RawState, Snapshot
-from cavsumo.theatre import Theatre
+from cavsumo.model.bodies import PEDESTRIAN, Body
+from cavsumo.model.geometry import gap
+from cavsumo.model.scenario import BatchPlan
+from cavsumo.model.snapshot import BodyState, RawState, Snapshot
+from cavsumo.network.site import Site
+from cavsumo.simulation.loop import Episode, play
+from cavsumo.sumo.background import Background, Roaming, roaming
 
 Staged = Callable[..., tuple[BatchPlan, Site]]
 DT, TOP = 0.1, 20.0  # s, m/s
@@ -137,11 +137,11 @@ def test_a_jump_that_no_bound_foresaw_is_said() -> None:
 def episodes(staged: Staged, name: str, agent: str, **settings: Any) -> Iterator[Episode]:
     """A few episodes, each as it is played and as it is recorded."""
     plan, site = staged(name, agents=(agent,), routes="auto", **settings)
-    with Theatre(plan, site) as theatre:
+    with EpisodeRunner(plan, site) as runner:
         for run in range(6):
             one = job(plan, run)
             for record in (False, True):
-                yield play(theatre.stage, theatre._cast(one), one.seed, record=record)
+                yield play(runner.setup, runner._cast(one), one.seed, record=record)
 
 
 @pytest.mark.parametrize(
@@ -163,10 +163,14 @@ def test_an_episode_is_the_same_whoever_is_read(
         assert fast.contacts.ego_pairs == full.contacts.ego_pairs
         assert fast.contacts.tester_pairs == full.contacts.tester_pairs
         assert fast.contacts.min_gap == full.contacts.min_gap
-        assert fast.course.extremes() == full.course.extremes()
-        assert fast.conduct.turning == full.conduct.turning
+        assert fast.criticality.extremes() == full.criticality.extremes()
+        assert fast.naturalness.turning == full.naturalness.turning
         full.frames, full.actions = fast.frames, fast.actions  # kept where it is recorded
-        full.contacts, full.course, full.conduct = fast.contacts, fast.course, fast.conduct
+        full.contacts, full.criticality, full.naturalness = (
+            fast.contacts,
+            fast.criticality,
+            fast.naturalness,
+        )
         assert fast == full
 
 
@@ -175,8 +179,8 @@ def test_whoever_is_left_out_of_a_snapshot_touches_nobody(staged: Staged, name: 
     """Every background body is read from SUMO beside the world; the boxes say who may be left."""
     plan, site = staged(name, routes="auto")
     skipped = 0
-    with Theatre(plan, site) as theatre:
-        world, one = theatre.stage.world, job(plan, 0)
+    with EpisodeRunner(plan, site) as runner:
+        world, one = runner.setup.world, job(plan, 0)
         inner = world._snapshot
 
         def checked(ego: BodyState, states: tuple[BodyState, ...]) -> Snapshot:
@@ -192,7 +196,7 @@ def test_whoever_is_left_out_of_a_snapshot_touches_nobody(staged: Staged, name: 
             return snapshot
 
         world._snapshot = checked  # type: ignore[method-assign]
-        play(theatre.stage, theatre._cast(one), one.seed)
+        play(runner.setup, runner._cast(one), one.seed)
     assert skipped
 
 
@@ -229,6 +233,6 @@ class Looking(TimingAgent):
 def test_whoever_looks_sees_everybody(staged: Staged) -> None:
     """One agent that looks is enough for the whole background to be read."""
     plan, site = staged("crossing", routes="auto")
-    with Theatre(plan, site) as theatre:
-        play(theatre.stage, [Looking() for _ in theatre.stage.teams], 1)
+    with EpisodeRunner(plan, site) as runner:
+        play(runner.setup, [Looking() for _ in runner.setup.teams], 1)
     assert Looking.seen > 5

@@ -9,15 +9,16 @@ from typing import Any
 
 import pytest
 
-from cavsumo.batch import run_batch
+from cavsumo.batch.dispatch import run_batch
+from cavsumo.batch.executors import local_executor
+from cavsumo.batch.jobs import job
+from cavsumo.batch.prepared import PreparedBatch
+from cavsumo.batch.worker import Answer, Worker
 from cavsumo.errors import InputError
-from cavsumo.executors import local_executor
-from cavsumo.jobs import episode_seed, job
-from cavsumo.outcomes import Outcome
-from cavsumo.setting import Setting
-from cavsumo.worker import Answer, Worker
+from cavsumo.model.seeds import episode_seed
+from cavsumo.results.rows import Outcome
 
-SetUp = Callable[..., Setting]
+SetUp = Callable[..., PreparedBatch]
 Row = dict[str, Any]
 
 # Fails in the episode whose first tester starts at x = doom: kills its process, hangs, or raises.
@@ -47,15 +48,15 @@ class Mishap:
 DOOMED = 2  # the episode that fails
 
 
-def answers(setting: Setting, jobs: int = 1) -> list[Answer]:
+def answers(prepared: PreparedBatch, jobs: int = 1) -> list[Answer]:
     """The outcomes of a batch in processes of its own, with what the agents know after each."""
     with local_executor(jobs) as executor:
-        return list(run_batch(setting, executor, setting.plan.todo()))
+        return list(run_batch(prepared, executor, prepared.plan.todo()))
 
 
-def played(setting: Setting) -> list[Outcome]:
+def played(prepared: PreparedBatch) -> list[Outcome]:
     """The outcomes of a batch."""
-    return [outcome for outcome, _ in answers(setting)]
+    return [outcome for outcome, _ in answers(prepared)]
 
 
 def lasting(outcome: Outcome) -> Row:
@@ -82,7 +83,7 @@ def trial(set_up: SetUp, tmp_path_factory: pytest.TempPathFactory) -> Iterator[T
     folder = tmp_path_factory.mktemp("controllers")
     (folder / "mishap_controller.py").write_text(MISHAP, encoding="utf-8")
 
-    def doomed(agent: str = "random", **params: Any) -> Setting:
+    def doomed(agent: str = "random", **params: Any) -> PreparedBatch:
         return set_up(
             ego="mishap_controller:Mishap",
             ego_params=params,
@@ -126,8 +127,8 @@ def test_what_sumo_refuses_comes_out_before_the_first_episode(
     """A route file with an unknown edge: no worker, one message, in SUMO's own words."""
     file = tmp_path / "bad.rou.xml"
     file.write_text('<routes><trip id="a" depart="0" from="nowhere" to="westbound"/></routes>')
-    setting = set_up(routes=file)
-    with pytest.raises(InputError, match="'nowhere'"), Worker(setting):
+    prepared = set_up(routes=file)
+    with pytest.raises(InputError, match="'nowhere'"), Worker(prepared):
         pytest.fail("the worker started")
 
 
@@ -156,10 +157,10 @@ def test_an_episode_is_the_same_in_any_batch_and_order(
     set_up: SetUp, recorded: list[Outcome]
 ) -> None:
     """Run i stays what it is when more runs are asked for, and whatever was played before it."""
-    setting = set_up("crossing", runs=5, **PAIR)
-    with Worker(setting) as worker:
+    prepared = set_up("crossing", runs=5, **PAIR)
+    with Worker(prepared) as worker:
         for run in (3, 0, 2, 1):
-            outcome, _ = worker.play(job(setting.plan, run))
+            outcome, _ = worker.play(job(prepared.plan, run))
             assert lasting(outcome) == lasting(recorded[run])
             assert repr(outcome.frames) == repr(recorded[run].frames)
 
@@ -188,9 +189,9 @@ def learned(set_up: SetUp) -> list[Any]:
 
 def test_learning_goes_on_in_the_next_process(set_up: SetUp, learned: list[Any]) -> None:
     """The weights are equal, whether one process played all episodes or another took over."""
-    setting = set_up(agents=["q-learning"], **SCHOOL)
-    with Worker(setting) as worker:
-        outcome, memory = worker.play(job(setting.plan, 2, learned[1]))
+    prepared = set_up(agents=["q-learning"], **SCHOOL)
+    with Worker(prepared) as worker:
+        outcome, memory = worker.play(job(prepared.plan, 2, learned[1]))
     assert outcome.row["outcome"] != "error"
     assert memory == learned[2]
     assert [m["episodes"] for m in memory] == [3, 3]
@@ -200,8 +201,8 @@ def test_learning_goes_on_in_the_next_process(set_up: SetUp, learned: list[Any])
 
 def test_a_death_loses_one_episode_and_not_the_training(trial: Trial) -> None:
     """The process dies in the third episode: the fourth goes on from what the second taught."""
-    setting = trial.set_up("q-learning", how="crash", doom=trial.doom)
-    memories = [memory for _, memory in answers(setting)]
+    prepared = trial.set_up("q-learning", how="crash", doom=trial.doom)
+    memories = [memory for _, memory in answers(prepared)]
     assert [memory[0]["episodes"] for memory in memories] == [1, 2, 2, 3, 4]
     assert memories[DOOMED] == memories[DOOMED - 1]
     assert memories[DOOMED + 1] != memories[DOOMED]
@@ -209,7 +210,7 @@ def test_a_death_loses_one_episode_and_not_the_training(trial: Trial) -> None:
 
 def test_a_learner_learns_from_its_own_episodes_only(set_up: SetUp, learned: list[Any]) -> None:
     """Beside another agent it knows as much after each of its episodes as it does alone."""
-    setting = set_up(agents=["random", "q-learning"], **SCHOOL)
-    memories = [memory for _, memory in answers(setting, jobs=2)]
+    prepared = set_up(agents=["random", "q-learning"], **SCHOOL)
+    memories = [memory for _, memory in answers(prepared, jobs=2)]
     assert memories[1::2] == learned
     assert memories[0::2] == [None, None, None]

@@ -14,9 +14,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from cavsumo.abstraction import response, solving
-from cavsumo.abstraction.opponent import KEEPS, OLDEST, Counts, Watch, situation
-from cavsumo.abstraction.response import (
+from cavsumo.agents import AGENTS
+from cavsumo.agents.planning import response, solving
+from cavsumo.agents.planning.opponent import KEEPS, OLDEST, AccelerationReader, Counts, situation
+from cavsumo.agents.planning.response import (
     SPEEDS,
     STAND,
     WALK,
@@ -29,8 +30,7 @@ from cavsumo.abstraction.response import (
     move,
     scale,
 )
-from cavsumo.abstraction.solving import best_response, chain, layer, roll_out, unsolved
-from cavsumo.agents import AGENTS
+from cavsumo.agents.planning.solving import best_response, chain, layer, roll_out, unsolved
 from cavsumo.errors import InputError
 from tests.support import STRAIGHT_NET
 
@@ -49,7 +49,7 @@ def small(monkeypatch: pytest.MonkeyPatch) -> None:
 
 def watched(accelerations: list[float], v: float = 8.0) -> list[tuple[int, bool | None]]:
     """Age and whether it was chosen anew, after each timestep of an ego."""
-    watch, seen = Watch(DT), []
+    watch, seen = AccelerationReader(DT), []
     watch.see(v)
     for a in accelerations:
         v = max(0.0, v + a * DT)

@@ -11,12 +11,12 @@ import pytest
 from shapely.geometry import Point
 from staging import Stage
 
-from cavsumo.blame import RULES
-from cavsumo.roads import Approach, Start
-from cavsumo.scenario import BatchPlan
-from cavsumo.site import Site
-from cavsumo.snapshot import BodyState, Snapshot
-from cavsumo.theatre import measured
+from cavsumo.assertions.blame import RULES
+from cavsumo.batch.episode_runner import measured
+from cavsumo.model.carriageway import Approach, Start
+from cavsumo.model.scenario import BatchPlan
+from cavsumo.model.snapshot import BodyState, Snapshot
+from cavsumo.network.site import Site
 
 Staged = Callable[..., tuple[BatchPlan, Site]]
 LEFT = math.pi / 2  # across the ego's way
@@ -49,9 +49,9 @@ def crosses(distance: float) -> Callable[[Snapshot, BodyState], tuple[float, flo
     return act
 
 
-def to_blame(stage: Stage, ego: Callable[[Snapshot], Any], places: list[Start], **more: Any) -> str:
+def to_blame(setup: Stage, ego: Callable[[Snapshot], Any], places: list[Start], **more: Any) -> str:
     """The blame of an episode in which the ego hits somebody."""
-    said, episode = stage.play("collision", ego, places=places, **more)
+    said, episode = setup.play("collision", ego, places=places, **more)
     assert said.verdict == "violated"
     assert episode.outcome == "violated"
     blame = str(measured(episode)["blame"])
@@ -103,9 +103,9 @@ def test_the_earliest_wins(straight: Stage) -> None:
 
 def test_a_red_light(staged: Staged) -> None:
     """The ego passes the line at red and hits somebody behind it."""
-    stage = Stage(*staged("junction", signal="red"))
-    there = stage.beside(stage.site.lights[0].along + 50.0, 0.0, LEFT)
-    assert to_blame(stage, at(10.0), [there], testers=stands, start=10.0) == "ego:red-light"
+    setup = Stage(*staged("junction", signal="red"))
+    there = setup.beside(setup.site.lights[0].along + 50.0, 0.0, LEFT)
+    assert to_blame(setup, at(10.0), [there], testers=stands, start=10.0) == "ego:red-light"
 
 
 @pytest.mark.parametrize(
@@ -113,14 +113,14 @@ def test_a_red_light(staged: Staged) -> None:
 )
 def test_a_crossing_at_lights(staged: Staged, signal: str, blame: str) -> None:
     """Where the ego has green, who walks over the crossing has red; and the other way round."""
-    stage = Stage(*staged("junction", signal=signal))
-    crossing = stage.site.marked[0]
+    setup = Stage(*staged("junction", signal=signal))
+    crossing = setup.site.marked[0]
     middle = (crossing.begin + crossing.end) / 2
-    places = [stage.beside(middle, -0.1 * i, LEFT) for i in range(20, 200)]
+    places = [setup.beside(middle, -0.1 * i, LEFT) for i in range(20, 200)]
     kerb = next(p for p in places if not crossing.surface.buffer(0.1).contains(Point(p.x, p.y)))
-    aside = -stage.site.route.path.project(kerb.x, kerb.y).lateral
+    aside = -setup.site.route.path.project(kerb.x, kerb.y).lateral
     walks = crosses(8.0 * (aside - 1.0) / 1.4)
-    assert to_blame(stage, at(8.0), [kerb], testers=walks, start=8.0) == blame
+    assert to_blame(setup, at(8.0), [kerb], testers=walks, start=8.0) == blame
 
 
 def test_a_vehicle_cuts_in(straight: Stage) -> None:

@@ -11,7 +11,8 @@ from gymnasium import spaces
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from cavsumo.bodies import (
+from cavsumo.errors import InputError, UnknownName
+from cavsumo.model.bodies import (
     BUS,
     CAR,
     KINDS,
@@ -23,7 +24,6 @@ from cavsumo.bodies import (
     kind_named,
     model_of,
 )
-from cavsumo.errors import InputError, UnknownName
 
 CALM = settings(deadline=None)
 CAV_GYM = {

@@ -12,25 +12,26 @@ from typing import Any
 import pytest
 from support import content, rows
 
-from cavsumo.certificate import as_json, certified, rounded_down, sentences
+from cavsumo.batch.certify.certificate import as_json, certified, rounded_down, sentences
+from cavsumo.batch.certify.ego_list import opponents
+from cavsumo.batch.certify.tested_policy import Subject, of_policy, of_run, settings_of
+from cavsumo.batch.certify.used_seeds import SUMO_SEEDS, fresh_seed, used
+from cavsumo.batch.episode_runner import EpisodeRunner
+from cavsumo.batch.jobs import job
+from cavsumo.batch.prepared import prepare
+from cavsumo.batch.replay import recorded, recorded_plan
+from cavsumo.batch.summary import Ended
+from cavsumo.batch.tally import Tally
 from cavsumo.cli import main
 from cavsumo.errors import Exit, InputError
-from cavsumo.jobs import episode_seed, job
-from cavsumo.kinematics import wrap
-from cavsumo.opponents import opponents
-from cavsumo.outcomes import row_line
-from cavsumo.replays import recorded, recorded_plan
-from cavsumo.results import HEADER
-from cavsumo.scenario import BatchPlan, Params, Scenario, plan_from
-from cavsumo.seeds import SUMO_SEEDS, fresh_seed, used
-from cavsumo.setting import prepare
-from cavsumo.statistics import lower_bound
-from cavsumo.study import overruled
-from cavsumo.subjects import Subject, of_policy, of_run, settings_of
-from cavsumo.summary import Ended
-from cavsumo.tally import Tally
-from cavsumo.theatre import Theatre
-from cavsumo.traces import Trace, parsed
+from cavsumo.model.kinematics import wrap
+from cavsumo.model.scenario import BatchPlan, Params, Scenario, plan_from
+from cavsumo.model.seeds import episode_seed
+from cavsumo.model.study import overruled
+from cavsumo.results.reading import HEADER
+from cavsumo.results.rows import row_line
+from cavsumo.results.statistics import lower_bound
+from cavsumo.results.traces import Trace, parsed
 
 ROOT = Path(__file__).parents[1]
 LEARNT = 5  # the third episode of the learner in the results
@@ -88,8 +89,8 @@ def traced(plan: BatchPlan, run: int, seed: int | None = None) -> Trace:
     again = dataclasses.replace(job(plan, run), record=True)
     if seed is not None:
         again = dataclasses.replace(again, seed=seed)
-    with Theatre(plan, prepare(plan).site) as theatre:
-        return parsed(theatre.play(again)[0].trace)
+    with EpisodeRunner(plan, prepare(plan).site) as runner:
+        return parsed(runner.play(again)[0].trace)
 
 
 # What is played
@@ -202,7 +203,7 @@ def test_seeds_are_none_of_those_used() -> None:
 
 def test_seeds_that_run_out_are_said(monkeypatch: pytest.MonkeyPatch) -> None:
     """There is an end to the search."""
-    monkeypatch.setattr("cavsumo.seeds._sumo_seeds", lambda seed, runs: [0])
+    monkeypatch.setattr("cavsumo.batch.certify.used_seeds._sumo_seeds", lambda seed, runs: [0])
     with pytest.raises(InputError, match="no 9 seeds beside 1 that were used; try fewer --runs"):
         fresh_seed(1, 9, [SUMO_SEEDS])
 

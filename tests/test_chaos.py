@@ -14,7 +14,7 @@ from pathlib import Path
 import pytest
 from support import rows
 
-from cavsumo.results import read_manifest
+from cavsumo.results.reading import read_manifest
 
 RUNS = 18
 DEADLINE_S = 5  # of an episode while processes are stopped
@@ -51,7 +51,7 @@ def playing(parent: int, folder: Path) -> list[int]:
         with contextlib.suppress(OSError):  # gone meanwhile
             process = Path("/proc", mark.name)
             mine = (process / "stat").read_text().rpartition(")")[2].split()[1] == str(parent)
-            if mine and b"cavsumo.worker_process" in (process / "cmdline").read_bytes():
+            if mine and b"cavsumo.batch.worker_process" in (process / "cmdline").read_bytes():
                 found.append(int(mark.name))
     return found
 

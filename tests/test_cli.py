@@ -13,8 +13,8 @@ from typing import Any
 
 import pytest
 
-from cavsumo.outcomes import COLUMNS
-from cavsumo.results import read_manifest, read_rows
+from cavsumo.results.columns import COLUMNS
+from cavsumo.results.reading import read_manifest, read_rows
 
 CONTROLLERS = """
 class Broken:

@@ -9,10 +9,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from cavsumo.bodies import BUS, CAR, PEDESTRIAN, Body, Kind
-from cavsumo.contacts import Contact, ContactMonitor
-from cavsumo.geometry import gap, overlap
-from cavsumo.snapshot import BodyState, Snapshot
+from cavsumo.assertions.contacts import Contact, ContactMonitor
+from cavsumo.model.bodies import BUS, CAR, PEDESTRIAN, Body, Kind
+from cavsumo.model.geometry import gap, overlap
+from cavsumo.model.snapshot import BodyState, Snapshot
 
 State = tuple[float, float, float, float]
 Others = Sequence[tuple[Kind, State]]

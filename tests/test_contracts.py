@@ -17,15 +17,15 @@ from cavsumo.agents.random import RandomAgent
 from cavsumo.assertions import ASSERTIONS, Assertion
 from cavsumo.assertions.base import UNFAIR, Judgement
 from cavsumo.assertions.collision import CollisionAssertion
-from cavsumo.bodies import Action
+from cavsumo.assertions.contacts import Contact
 from cavsumo.cli import main
-from cavsumo.contacts import Contact
 from cavsumo.egos import EGOS, Acceleration, Command, Ego, make_ego
 from cavsumo.egos.base import EGO_KIND, Mission
 from cavsumo.egos.time_gap import TimeGapEgo
 from cavsumo.errors import EgoError
-from cavsumo.scene import Scene
-from cavsumo.snapshot import Snapshot
+from cavsumo.model.bodies import Action
+from cavsumo.model.scene import Scene
+from cavsumo.model.snapshot import Snapshot
 from cavsumo.testing import (
     AgentContract,
     AssertionContract,

@@ -13,8 +13,8 @@ import pytest
 from cavsumo.agents.base import Scene
 from cavsumo.egos import make_ego
 from cavsumo.errors import EgoError, InputError, UnknownName
-from cavsumo.snapshot import Snapshot
-from cavsumo.world import World
+from cavsumo.model.snapshot import Snapshot
+from cavsumo.sumo.world import World
 
 Opener = Callable[..., World]
 Writer = Callable[..., str]
@@ -184,7 +184,7 @@ class Broken:
     [
         ("Silent", InputError, r"has no method act\(snapshot\)"),
         ("Greedy", InputError, r"depart_speed must lie in \[0, 55\] m/s"),
-        ("Shapeless", InputError, "kind must be a cavsumo.bodies.Kind, got 'car'"),
+        ("Shapeless", InputError, "kind must be a cavsumo.model.bodies.Kind, got 'car'"),
         ("Needy", InputError, "cannot be built: TypeError: .*'map'"),
         ("Broken", InputError, "cannot be built: OSError: no such model"),
         ("Silnt", UnknownName, "unknown class .*'Silnt'; did you mean 'Silent'"),

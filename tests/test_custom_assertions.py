@@ -13,13 +13,13 @@ import pytest
 from support import rows, traces
 
 from cavsumo.assertions import Assertion, make_assertions
-from cavsumo.bodies import CAR, Body
 from cavsumo.cli import main
 from cavsumo.egos.base import EGO_KIND
 from cavsumo.errors import AssertionFault, InputError, UnknownName
-from cavsumo.paths import Path as Polyline
-from cavsumo.scene import Scene
-from cavsumo.snapshot import BodyState, Snapshot
+from cavsumo.model.bodies import CAR, Body
+from cavsumo.model.polyline import Path as Polyline
+from cavsumo.model.scene import Scene
+from cavsumo.model.snapshot import BodyState, Snapshot
 from cavsumo.testing import AssertionContract
 from cavsumo.testing.assertion_checks import encounter
 from cavsumo.testing.scripts import ground

@@ -18,10 +18,10 @@ from cavsumo.agents.driving import (
     steer_at,
     stopping_from,
 )
-from cavsumo.bodies import BICYCLE, BUS, CAR, Body, Kind
-from cavsumo.kinematics import step_floats
-from cavsumo.paths import Path
-from cavsumo.snapshot import BodyState
+from cavsumo.model.bodies import BICYCLE, BUS, CAR, Body, Kind
+from cavsumo.model.kinematics import step_floats
+from cavsumo.model.polyline import Path
+from cavsumo.model.snapshot import BodyState
 
 DT = 0.1
 

@@ -13,14 +13,14 @@ import numpy as np
 import pytest
 
 from cavsumo.agents.base import Scene
-from cavsumo.bodies import CAR, Body
-from cavsumo.egos import protocol
 from cavsumo.egos.base import EGO_KIND, Acceleration, Drive, Mission
 from cavsumo.egos.effectors import checked
+from cavsumo.egos.external import protocol
 from cavsumo.errors import EgoError
-from cavsumo.paths import Path as Polyline
-from cavsumo.roads import Light
-from cavsumo.snapshot import Snapshot
+from cavsumo.model.bodies import CAR, Body
+from cavsumo.model.carriageway import Light
+from cavsumo.model.polyline import Path as Polyline
+from cavsumo.model.snapshot import Snapshot
 
 DOCS = Path(__file__).parents[1] / "docs" / "ego-protocol.md"
 LIGHTS = (Light("J1", 2, 40.0), Light("J2", 0, 80.0))

@@ -11,12 +11,12 @@ import libsumo
 import pytest
 
 from cavsumo.agents.base import Scene
-from cavsumo.bodies import CAR, PEDESTRIAN, Body
 from cavsumo.egos import make_ego
 from cavsumo.errors import InputError, UnknownName
-from cavsumo.roads import Start
-from cavsumo.snapshot import BodyState, Snapshot
-from cavsumo.world import World
+from cavsumo.model.bodies import CAR, PEDESTRIAN, Body
+from cavsumo.model.carriageway import Start
+from cavsumo.model.snapshot import BodyState, Snapshot
+from cavsumo.sumo.world import World
 
 Opener = Callable[..., World]
 LANE_Y = -1.825  # of the ego's lane on the straight road [m]

@@ -20,24 +20,24 @@ from gymnasium.vector import AsyncVectorEnv
 from support import SHORT, STRAIGHT_NET
 
 from cavsumo.agents import AGENTS
-from cavsumo.bodies import CAR, PEDESTRIAN
-from cavsumo.ego_observations import entries as ego_entries
-from cavsumo.ego_rewards import HARSH_COST, OFF_ROAD, PROGRESS, TIME_COST, VIOLATION
+from cavsumo.agents.observations import entries
+from cavsumo.batch.episode_runner import EpisodeRunner
+from cavsumo.batch.jobs import Job
 from cavsumo.egos import make_ego
 from cavsumo.egos.base import Acceleration, Command
 from cavsumo.envs import parallel_env, tester
 from cavsumo.envs.discrete import DiscreteActions
 from cavsumo.envs.ego import EgoEnv
+from cavsumo.envs.ego_observations import entries as ego_entries
+from cavsumo.envs.ego_rewards import HARSH_COST, OFF_ROAD, PROGRESS, TIME_COST, VIOLATION
 from cavsumo.errors import AgentError, InputError, SimulationError, SimulationTaken
-from cavsumo.jobs import Job
-from cavsumo.observations import entries
-from cavsumo.outcomes import cell
-from cavsumo.rewards import GOAL, ROAD_COST
-from cavsumo.simulator import Performance
-from cavsumo.snapshot import Snapshot
-from cavsumo.stage import set_stage
-from cavsumo.theatre import Theatre
-from cavsumo.world import World
+from cavsumo.model.bodies import CAR, PEDESTRIAN
+from cavsumo.model.snapshot import Snapshot
+from cavsumo.results.rows import cell
+from cavsumo.simulation.loop import EpisodeLoop
+from cavsumo.simulation.rewards import GOAL, ROAD_COST
+from cavsumo.simulation.setup import make_setup
+from cavsumo.sumo.world import World
 
 NEAR = {"range_m": 3.0}
 IDS = ("cavsumo/Tester-v0", "cavsumo/Ego-v0")
@@ -140,11 +140,11 @@ def test_a_tester_moved_from_outside_gives_the_row_of_a_batch(
     set_up: Callable[..., Any], make: Make
 ) -> None:
     """The starts, and with an agent's actions every column, are those of ``cavsumo run``."""
-    setting = set_up("pedestrians", bodies_per_agent=3, trace="none", agents=("timing",), end=20.0)
+    prepared = set_up("pedestrians", bodies_per_agent=3, trace="none", agents=("timing",), end=20.0)
     seed = 6
-    with Theatre(setting.plan, setting.site) as theatre:
-        row = theatre.play(Job(0, "timing", seed))[0].row
-        noted = _tester_actions(theatre, seed)
+    with EpisodeRunner(prepared.plan, prepared.site) as runner:
+        row = runner.play(Job(0, "timing", seed))[0].row
+        noted = _tester_actions(runner, seed)
     env = make(until="verdict", end=20.0)
     env.reset(seed=seed)
     steps = to_the_end(env, iter(noted))
@@ -157,7 +157,7 @@ def test_a_tester_moved_from_outside_gives_the_row_of_a_batch(
     assert times == [row["trigger_time_s"]]
 
 
-def _tester_actions(theatre: Theatre, seed: int) -> list[Any]:
+def _tester_actions(runner: EpisodeRunner, seed: int) -> list[Any]:
     """The actions of the timing agent in an episode, from -1 to 1."""
     agent = AGENTS.make("timing", {})
     choose, noted = agent.choose_action, []
@@ -167,9 +167,9 @@ def _tester_actions(theatre: Theatre, seed: int) -> list[Any]:
         return noted[-1]
 
     agent.choose_action = noting  # type: ignore[method-assign]
-    performance = Performance(theatre.stage, [agent], seed)
-    while not performance.over:
-        performance.step()
+    loop = EpisodeLoop(runner.setup, [agent], seed)
+    while not loop.over:
+        loop.step()
     limits = [PEDESTRIAN.throttle_max, PEDESTRIAN.steering_max] * 3
     return [np.array(joint).reshape(-1) / limits for joint in noted]
 
@@ -178,7 +178,7 @@ def test_an_ego_driven_from_outside_gives_the_row_of_a_batch(
     set_up: Callable[..., Any], make: Make
 ) -> None:
     """With the answers of a controller every column is that of ``cavsumo run`` with it."""
-    setting = set_up("pedestrians", ego="time-gap", trace="none", agents=("proximity",), end=20.0)
+    prepared = set_up("pedestrians", ego="time-gap", trace="none", agents=("proximity",), end=20.0)
     ego, noted, seed = make_ego("time-gap", {}), [], 3
     act = ego.act
 
@@ -188,14 +188,14 @@ def test_an_ego_driven_from_outside_gives_the_row_of_a_batch(
         noted.append([command.value / 9.0])
         return command
 
-    with Theatre(setting.plan, setting.site) as theatre:
-        row = theatre.play(Job(0, "proximity", seed))[0].row
+    with EpisodeRunner(prepared.plan, prepared.site) as runner:
+        row = runner.play(Job(0, "proximity", seed))[0].row
     ego.act = noting  # type: ignore[method-assign]
-    stage = set_stage(setting.plan.scenario, setting.site, ego)
-    performance = Performance(stage, [AGENTS.make("proximity", {}) for _ in range(3)], seed)
-    while not performance.over:
-        performance.step()
-    stage.close()
+    setup = make_setup(prepared.plan.scenario, prepared.site, ego)
+    loop = EpisodeLoop(setup, [AGENTS.make("proximity", {}) for _ in range(3)], seed)
+    while not loop.over:
+        loop.step()
+    setup.close()
     env = make("Ego", agent="proximity", depart_speed=8.33, max_speed=55.0, end=20.0)
     env.reset(seed=seed)
     summary = to_the_end(env, iter(noted))[-1][4]["summary"]
@@ -480,10 +480,10 @@ def test_a_scenario_file_says_it_all(tmp_path: Path, make: Make) -> None:
         encoding="utf-8",
     )
     env = tester.TesterEnv(config=file, end=3.0)
-    scenario = env.setting.plan.scenario
+    scenario = env.prepared.plan.scenario
     assert (scenario.testers, scenario.end, scenario.bodies_per_agent) == (2, 3.0, 2)
     assert scenario.ego_params == {"carFollowModel": "IDM"}
-    assert EgoEnv(config=file, agent="random").setting.plan.params == {"rate_per_s": 2.0}
+    assert EgoEnv(config=file, agent="random").prepared.plan.params == {"rate_per_s": 2.0}
 
 
 # Pictures

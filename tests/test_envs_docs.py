@@ -11,12 +11,13 @@ from pathlib import Path
 
 import pytest
 
-from cavsumo import ego_observations, ego_rewards, observations, rewards
-from cavsumo.bodies import CAR, PEDESTRIAN
-from cavsumo.envs import events, tester
+from cavsumo.agents import observations
+from cavsumo.envs import ego_observations, ego_rewards, events, tester
 from cavsumo.envs.ego import EgoEnv
 from cavsumo.envs.parallel import CavsumoParallelEnv
 from cavsumo.envs.puppets import PuppetEgo
+from cavsumo.model.bodies import CAR, PEDESTRIAN
+from cavsumo.simulation import rewards
 
 ROOT = Path(__file__).resolve().parents[1]
 PAGE = (ROOT / "docs" / "environments.md").read_text(encoding="utf-8")

@@ -13,7 +13,7 @@ from support import SHORT, STRAIGHT_NET
 
 from cavsumo.envs import parallel_env
 from cavsumo.errors import AgentError, InputError
-from cavsumo.rewards import GOAL
+from cavsumo.simulation.rewards import GOAL
 
 Make = Callable[..., Any]
 

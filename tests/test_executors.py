@@ -18,15 +18,15 @@ from typing import Any
 import pytest
 from support import PATIENCE_S, rows, until
 
-from cavsumo.batch import run_batch
+from cavsumo.batch.dispatch import run_batch
+from cavsumo.batch.executors import Means, local_executor, opened
+from cavsumo.batch.prepared import PreparedBatch, prepare
+from cavsumo.batch.worker import close_all
 from cavsumo.cli import main
 from cavsumo.errors import BatchError
-from cavsumo.executors import Means, local_executor, opened
-from cavsumo.outcomes import Outcome
-from cavsumo.results import read_manifest
-from cavsumo.scenario import plan_from
-from cavsumo.setting import Setting, prepare
-from cavsumo.worker import close_all
+from cavsumo.model.scenario import plan_from
+from cavsumo.results.reading import read_manifest
+from cavsumo.results.rows import Outcome
 
 RUNS = 6
 WORDS = f"-r none --agent timing --agent q-learning --testers 2 --end 8 --runs {RUNS} -q".split()
@@ -38,7 +38,7 @@ def lasting(outcome: Outcome) -> tuple[dict[str, Any], str]:
 
 
 @pytest.fixture(scope="module")
-def setting(networks: dict[str, Path]) -> Setting:
+def prepared(networks: dict[str, Path]) -> PreparedBatch:
     """An agent that learns and one that does not, with traces."""
     chosen = {"net": networks["crossing"], "routes": "none", "end": 8.0, "runs": RUNS}
     chosen |= {"agents": ["timing", "q-learning"], "testers": 2}
@@ -46,15 +46,15 @@ def setting(networks: dict[str, Path]) -> Setting:
 
 
 @pytest.fixture(scope="module")
-def quiet(setting: Setting) -> list[Any]:
+def quiet(prepared: PreparedBatch) -> list[Any]:
     """What comes out of one process, episode by episode."""
     with local_executor(1) as executor:
-        return played(setting, executor)
+        return played(prepared, executor)
 
 
-def played(setting: Setting, executor: Executor) -> list[Any]:
+def played(prepared: PreparedBatch, executor: Executor) -> list[Any]:
     """What comes out of an executor: rows, traces and what was learned, in order."""
-    batch = run_batch(setting, executor, setting.plan.todo())
+    batch = run_batch(prepared, executor, prepared.plan.todo())
     return [(lasting(outcome), memory) for outcome, memory in batch]
 
 
@@ -73,34 +73,34 @@ def file_rows(file: Path) -> list[tuple[str, str, str]]:
 # Processes of this machine ------------------------------------------------------------------------
 
 
-def test_two_at_a_time_play_what_one_plays(setting: Setting, quiet: list[Any]) -> None:
+def test_two_at_a_time_play_what_one_plays(prepared: PreparedBatch, quiet: list[Any]) -> None:
     """-j 2 changes nothing but the time it takes."""
     with opened(Means(jobs=2)) as (executor, jobs):
         assert jobs == 2
-        assert played(setting, executor) == quiet
+        assert played(prepared, executor) == quiet
 
 
-def test_a_plain_thread_pool_will_do(setting: Setting, quiet: list[Any]) -> None:
+def test_a_plain_thread_pool_will_do(prepared: PreparedBatch, quiet: list[Any]) -> None:
     """Any executor of the standard library can be given, as others keep to its interface."""
     try:
         with ThreadPoolExecutor(3) as executor:
-            assert played(setting, executor) == quiet
+            assert played(prepared, executor) == quiet
     finally:
         close_all()
 
 
-def test_a_plain_process_pool_will_do(setting: Setting, quiet: list[Any]) -> None:
+def test_a_plain_process_pool_will_do(prepared: PreparedBatch, quiet: list[Any]) -> None:
     """All that is sent there and back can be pickled."""
     with ProcessPoolExecutor(2, multiprocessing.get_context("spawn")) as executor:
-        assert played(setting, executor) == quiet
+        assert played(prepared, executor) == quiet
 
 
-def test_an_executor_that_is_shut_down_is_one_sentence(setting: Setting) -> None:
+def test_an_executor_that_is_shut_down_is_one_sentence(prepared: PreparedBatch) -> None:
     """Nothing is played, and nobody waits for it."""
     executor = ThreadPoolExecutor(1)
     executor.shutdown()
     with pytest.raises(BatchError, match="takes no more episodes"):
-        played(setting, executor)
+        played(prepared, executor)
 
 
 # Words that make no sense -------------------------------------------------------------------------
@@ -186,12 +186,12 @@ def dask_words(networks: dict[str, Path]) -> Callable[[Any], list[str]]:
 
 
 def test_dask_plays_what_one_process_plays(
-    setting: Setting, quiet: list[Any], cluster: Any
+    prepared: PreparedBatch, quiet: list[Any], cluster: Any
 ) -> None:
     """Rows, traces and what was learned; as many at a time as the cluster has threads."""
     with opened(Means(None, "dask", cluster.scheduler_address)) as (executor, jobs):
         assert jobs == 2
-        assert played(setting, executor) == quiet
+        assert played(prepared, executor) == quiet
 
 
 def test_a_dask_worker_that_is_killed_loses_nothing(
@@ -271,7 +271,7 @@ def test_a_scheduler_that_is_not_there_is_one_sentence(
 ) -> None:
     """Exit 2 after a while, and nothing is written."""
     pytest.importorskip("distributed")
-    monkeypatch.setattr("cavsumo.executors.CONNECT_S", 2.0)
+    monkeypatch.setattr("cavsumo.batch.executors.CONNECT_S", 2.0)
     there = address.replace("PORT", str(free_port()))
     said = refused("--executor", "dask", "--scheduler", there)
     assert f"scheduler {there!r}: cannot be reached" in said

@@ -12,10 +12,10 @@ from support import rows
 
 from cavsumo.agents import AGENTS, Scene
 from cavsumo.agents.base import NOT_FORCEABLE, SURE
-from cavsumo.bodies import PEDESTRIAN, Action
 from cavsumo.cli import main
-from cavsumo.kinematics import step_floats
-from cavsumo.snapshot import Snapshot
+from cavsumo.model.bodies import PEDESTRIAN, Action
+from cavsumo.model.kinematics import step_floats
+from cavsumo.model.snapshot import Snapshot
 
 MakeScene = Callable[..., Scene]
 See = Callable[..., Snapshot]

@@ -24,11 +24,12 @@ from support import alive, rows, traces, until, workers_of
 
 from cavsumo.agents.base import Scene
 from cavsumo.cli import main
-from cavsumo.egos import Acceleration, Command, Ego, link, make_ego
+from cavsumo.egos import Acceleration, Command, Ego, make_ego
 from cavsumo.egos.base import Mission
+from cavsumo.egos.external import link
 from cavsumo.errors import EgoError
-from cavsumo.results import read_manifest
-from cavsumo.snapshot import Snapshot
+from cavsumo.model.snapshot import Snapshot
+from cavsumo.results.reading import read_manifest
 
 EXAMPLES = Path(__file__).parents[1] / "examples" / "egos"
 CAREFUL = EXAMPLES / "stop_for_pedestrians.py"

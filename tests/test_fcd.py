@@ -9,14 +9,14 @@ from typing import Any
 import pytest
 import sumolib
 
-from cavsumo import simulations
+from cavsumo.batch.replay import Record
 from cavsumo.errors import InputError
-from cavsumo.fcd import write_fcd
-from cavsumo.options import OPTIONS
-from cavsumo.replays import Record
-from cavsumo.site import Site
-from cavsumo.traces import Trace, frame, parsed, trace_head, trace_text
-from cavsumo.world import World
+from cavsumo.interop.fcd import write_fcd
+from cavsumo.network.site import Site
+from cavsumo.results.traces import Trace, frame, parsed, trace_head, trace_text
+from cavsumo.sumo import connection
+from cavsumo.sumo.options import OPTIONS
+from cavsumo.sumo.world import World
 
 Seen = dict[str, tuple[str, float, float, float, float]]  # element, x, y, angle, speed by id
 
@@ -41,7 +41,7 @@ def test_it_is_what_sumo_writes_itself(
     Without testers: SUMO crashes when it writes the lane of a body that is on none.
     """
     theirs, ours = tmp_path / "sumo.xml", tmp_path / "ours.xml"
-    monkeypatch.setattr(simulations, "OPTIONS", {**OPTIONS, "fcd-output": str(theirs)})
+    monkeypatch.setattr(connection, "OPTIONS", {**OPTIONS, "fcd-output": str(theirs)})
     with open_world("crossing", routes="auto") as world:
         snapshots = [world.reset(1, (), ())]
         for _ in range(50):

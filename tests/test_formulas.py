@@ -16,15 +16,13 @@ import numpy as np
 import pytest
 
 from cavsumo.assertions.formula import FormulaAssertion
-from cavsumo.bodies import CAR, PEDESTRIAN, Body
-from cavsumo.errors import AssertionFault, InputError, UnknownName
-from cavsumo.formulas import SIGNALS, Moment, View, robustness, rule
-from cavsumo.formulas.nodes import (
+from cavsumo.assertions.formulas import SIGNALS, Moment, View, robustness, rule
+from cavsumo.assertions.formulas.nodes import (
     Comparison,
     Conditional,
+    Connective,
     Constant,
     Interval,
-    Junction,
     Not,
     Number,
     Signal,
@@ -32,13 +30,15 @@ from cavsumo.formulas.nodes import (
     TruthNode,
     Until,
 )
-from cavsumo.formulas.semantics import TINY, Bounds
-from cavsumo.formulas.windows import largest_ahead
-from cavsumo.metrics import drac_boxes, ttc_boxes
-from cavsumo.paths import Path as Polyline
-from cavsumo.roads import Light, Start
-from cavsumo.scene import Scene
-from cavsumo.snapshot import BodyState, Snapshot
+from cavsumo.assertions.formulas.semantics import TINY, Bounds
+from cavsumo.assertions.formulas.windows import largest_ahead
+from cavsumo.assertions.metrics import drac_boxes, ttc_boxes
+from cavsumo.errors import AssertionFault, InputError, UnknownName
+from cavsumo.model.bodies import CAR, PEDESTRIAN, Body
+from cavsumo.model.carriageway import Light, Start
+from cavsumo.model.polyline import Path as Polyline
+from cavsumo.model.scene import Scene
+from cavsumo.model.snapshot import BodyState, Snapshot
 
 VECTORS = Path(__file__).parent / "data" / "formula_vectors.json"
 CASES = json.loads(VECTORS.read_text(encoding="utf-8"))["cases"]
@@ -120,9 +120,9 @@ def truth(node: TruthNode, trace: Trace, i: int, n: int, closed: bool) -> bool |
             return bool(COMPARE[op](trace[name][i], bound))
         case Not(of=of):
             return _not(at(of, i=i))
-        case Junction(op="and", of=parts):
+        case Connective(op="and", of=parts):
             return _all(at(part, i=i) for part in parts)
-        case Junction(of=parts):
+        case Connective(of=parts):
             return _not(_all(_not(at(part, i=i)) for part in parts))
         case Conditional(left=left, right=right, both=both):
             p, q = at(left, i=i), at(right, i=i)
@@ -185,7 +185,9 @@ def random_formula(rng: random.Random, depth: int) -> TruthNode:
     if sort == 2:
         return Not(below(), 0)
     if sort == 3:
-        return Junction(rng.choice(["and", "or"]), (below(), below(), below())[: 2 + begin % 2], 0)
+        return Connective(
+            rng.choice(["and", "or"]), (below(), below(), below())[: 2 + begin % 2], 0
+        )
     if sort == 4:
         return Conditional(below(), below(), rng.random() < 0.3, 0)
     if sort == 5:
@@ -258,7 +260,7 @@ def _positive(rng: random.Random, depth: int) -> TruthNode:
         return Comparison(op, Signal("x", 0), bound, 0)
     parts = _positive(rng, depth - 1), _positive(rng, depth - 1)
     if rng.random() < 0.3:
-        return Junction(rng.choice(["and", "or"]), parts, 0)
+        return Connective(rng.choice(["and", "or"]), parts, 0)
     if rng.random() < 0.4:
         return Until(*parts, within, rng.random() < 0.5, 0)
     return Temporal(

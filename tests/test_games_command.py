@@ -106,7 +106,7 @@ def test_a_long_solution_says_what_it_does(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     """A line now and then on stderr, with the seconds so far; none with --quiet."""
-    monkeypatch.setattr("cavsumo.commands.game.EVERY_S", 0.001)
+    monkeypatch.setattr("cavsumo.cli.commands.game.EVERY_S", 0.001)
     words = ["game", "solve", write("pursuit_line_7", tmp_path), "--reading", "B", "--json"]
     assert main(words) == 0
     lines = capsys.readouterr().err.splitlines()

@@ -10,12 +10,14 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 from shapely.affinity import rotate, scale, translate
 
-from cavsumo.geometry import (
+from cavsumo.model.geometry import (
     Box,
     corners,
     gap,
     in_frame,
     overlap,
+)
+from cavsumo.model.stopping_zones import (
     stopping_distances,
     zone_entered,
     zone_polygons,

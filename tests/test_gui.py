@@ -11,13 +11,13 @@ from pathlib import Path
 
 import pytest
 
-from cavsumo import gui
+from cavsumo.batch.replay import Record
 from cavsumo.cli import main
 from cavsumo.errors import Exit, InputError
-from cavsumo.gui import check_gui, command, show
-from cavsumo.replays import Record
-from cavsumo.site import Site
-from cavsumo.traces import Trace
+from cavsumo.interop import gui
+from cavsumo.interop.gui import check_gui, command, show
+from cavsumo.network.site import Site
+from cavsumo.results.traces import Trace
 
 
 @pytest.fixture

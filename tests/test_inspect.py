@@ -14,12 +14,12 @@ from typing import Any
 import pytest
 
 from cavsumo.cli import main
-from cavsumo.ego_routes import _turns_back, movements, ranked_routes
-from cavsumo.facts import facts
-from cavsumo.inspection import best_junctions, ground, junction
-from cavsumo.network import read_network
-from cavsumo.paths import Path as Polyline
-from cavsumo.site import best_route
+from cavsumo.model.polyline import Path as Polyline
+from cavsumo.network.ego_routes import _turns_back, movements, ranked_routes
+from cavsumo.network.facts import facts
+from cavsumo.network.inspection import best_junctions, ground, junction
+from cavsumo.network.reader import read_network
+from cavsumo.network.site import best_route
 
 HALF_M = 2.25
 Capture = pytest.CaptureFixture[str]
@@ -34,7 +34,7 @@ needs_netconvert = pytest.mark.skipif(
 @pytest.fixture(scope="module")
 def grid(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A town of 529 junctions and 2,024 edges, with pavements and crossings."""
-    import cavsumo.netconvert as program
+    import cavsumo.network.osm.netconvert as program
 
     file = tmp_path_factory.mktemp("grid") / "grid.net.xml"
     tool = program.sumo_home() / "bin" / "netgenerate"
@@ -205,7 +205,7 @@ def test_without_pyproj_it_says_what_brings_it(
     networks: dict[str, Path], capsys: Capture, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """The centre is left out, everything else is there."""
-    monkeypatch.setattr("cavsumo.facts.find_spec", lambda name: None)
+    monkeypatch.setattr("cavsumo.network.facts.find_spec", lambda name: None)
     found = _looked(capsys, str(networks["crossing"]), "--top", "1")
     assert found["facts"]["centre"] is None
     assert any("pip install 'cavsumo[osm]' brings pyproj" in n for n in found["facts"]["notes"])
@@ -247,7 +247,7 @@ def test_a_picture_that_cannot_be_drawn_is_refused(
     words: str,
 ) -> None:
     """Another ending, no folder, no matplotlib: one sentence, nothing written."""
-    for module in ("cavsumo.picture", "cavsumo.layers"):
+    for module in ("cavsumo.network.drawing.picture", "cavsumo.network.drawing.layers"):
         monkeypatch.delitem(sys.modules, module, raising=False)
     for module in ("matplotlib", "matplotlib.axes", "matplotlib.figure", "matplotlib.ft2font"):
         monkeypatch.setitem(sys.modules, module, None)

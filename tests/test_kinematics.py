@@ -10,7 +10,7 @@ from hypothesis import example, given
 from hypothesis import strategies as st
 
 from cavsumo.errors import CavsumoError, NoSuchAction
-from cavsumo.kinematics import (
+from cavsumo.model.kinematics import (
     axles,
     centre_of_rotation,
     inverse,

@@ -10,9 +10,9 @@ import pytest
 from support import rows
 
 from cavsumo.cli import main
-from cavsumo.config import read_config
-from cavsumo.labels import cast_of
-from cavsumo.results import read_manifest
+from cavsumo.model.labels import cast_of
+from cavsumo.model.scenario_file import read_config
+from cavsumo.results.reading import read_manifest
 
 
 def test_a_label_stands_before_the_name() -> None:

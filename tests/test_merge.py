@@ -10,13 +10,13 @@ from typing import Any
 import pytest
 from support import Troupe, content, rows, traces
 
+from cavsumo.batch.batch_run import BatchRun
+from cavsumo.batch.executors import local_executor
+from cavsumo.batch.prepared import manifest, prepare
 from cavsumo.cli import main
-from cavsumo.executors import local_executor
-from cavsumo.recorder import Recorder
-from cavsumo.results import read_manifest
-from cavsumo.scenario import plan_from
-from cavsumo.session import Session
-from cavsumo.setting import manifest, prepare
+from cavsumo.model.scenario import plan_from
+from cavsumo.results.reading import read_manifest
+from cavsumo.results.writing import Recorder
 
 RUNS = 5
 SHARDS = {"whole": None, "a": "1/2", "b": "2/2", "c1": "1/3", "c2": "2/3", "c3": "3/3"}
@@ -37,12 +37,12 @@ def town(networks: Mapping[str, Path], tmp_path_factory: pytest.TempPathFactory)
         executor = Troupe(prepare(plan_from(settings, "test")), threads)
 
         def play(name: str, **more: Any) -> None:
-            setting = prepare(plan_from({**settings, **more}, "test"))
+            prepared = prepare(plan_from({**settings, **more}, "test"))
             with Recorder(folder / f"{name}.csv") as recorder:
-                session = Session(setting, recorder, executor, 2, lambda: False)
-                session.begin(manifest(setting))
-                session.play()
-                session.end()
+                batch_run = BatchRun(prepared, recorder, executor, 2, lambda: False)
+                batch_run.begin(manifest(prepared))
+                batch_run.play()
+                batch_run.end()
 
         for name, shard in SHARDS.items():
             play(name, **({"shard": shard} if shard else {}))

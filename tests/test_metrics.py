@@ -12,10 +12,10 @@ import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
-from cavsumo import metrics
+from cavsumo.assertions import metrics
+from cavsumo.assertions.metrics.encroachment import boxes_overlap
 from cavsumo.errors import InputError
-from cavsumo.geometry import Box, gap, overlap
-from cavsumo.metrics.encroachment import boxes_overlap
+from cavsumo.model.geometry import Box, gap, overlap
 
 CASES = json.loads((Path(__file__).parent / "data" / "assertion_vectors.json").read_text())["cases"]
 

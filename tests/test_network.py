@@ -14,11 +14,11 @@ import libsumo
 import pytest
 from shapely.geometry import LineString, Point
 
-from cavsumo.ego_routes import APPROACH_M
 from cavsumo.errors import InputError, NetworkError, UnknownName
-from cavsumo.network import Network, driving_lanes, lane_shape, read_network
-from cavsumo.snapshot import Snapshot
-from cavsumo.world import World
+from cavsumo.model.snapshot import Snapshot
+from cavsumo.network.ego_routes import APPROACH_M
+from cavsumo.network.reader import Network, driving_lanes, lane_shape, read_network
+from cavsumo.sumo.world import World
 
 Staged = Callable[..., Any]
 ALL = pytest.mark.parametrize("name", ["pedestrians", "crossing", "junction"])

@@ -10,18 +10,20 @@ import pytest
 from support import rows, traces
 
 from cavsumo.agents import AGENTS, Agent
+from cavsumo.agents.casting import make_agents
+from cavsumo.batch.episode_runner import EpisodeRunner
+from cavsumo.batch.jobs import job
 from cavsumo.cli import main
-from cavsumo.config import read_config
 from cavsumo.errors import InputError, UnknownName
-from cavsumo.jobs import episode_seed, job, make_agents
-from cavsumo.scenario import BatchPlan, plan_from
-from cavsumo.sensors import Sensor
-from cavsumo.simulator import Performance, play
-from cavsumo.site import Site
-from cavsumo.snapshot import Snapshot
-from cavsumo.stage import set_stage
-from cavsumo.theatre import Theatre
-from cavsumo.traces import frame
+from cavsumo.model.scenario import BatchPlan, plan_from
+from cavsumo.model.scenario_file import read_config
+from cavsumo.model.seeds import episode_seed
+from cavsumo.model.sensors import Sensor
+from cavsumo.model.snapshot import Snapshot
+from cavsumo.network.site import Site
+from cavsumo.results.traces import frame
+from cavsumo.simulation.loop import EpisodeLoop, play
+from cavsumo.simulation.setup import make_setup
 
 Staged = Callable[..., tuple[BatchPlan, Site]]
 Writer = Callable[..., str]
@@ -52,8 +54,8 @@ def words(option: str, sensor: dict[str, Any]) -> list[str]:
 
 def outcomes(plan: BatchPlan, site: Site) -> list[str]:
     """Of a batch, played in this process; an error says what it was."""
-    with Theatre(plan, site) as theatre:
-        found = [theatre.play(job(plan, run))[0].row for run in range(plan.runs)]
+    with EpisodeRunner(plan, site) as runner:
+        found = [runner.play(job(plan, run))[0].row for run in range(plan.runs)]
     return [row.get("error") or row["outcome"] for row in found]
 
 
@@ -76,11 +78,11 @@ def test_who_does_not_look_is_not_changed(staged: Staged, where: str) -> None:
     frames = []
     for sensor in ({}, {where: BAD_EYES}):
         plan, site = staged("crossing", **settings, **sensor)
-        stage = set_stage(plan.scenario, site)
+        setup = make_setup(plan.scenario, site)
         try:
-            episode = play(stage, make_agents(plan, "random"), 5, record=True)
+            episode = play(setup, make_agents(plan, "random"), 5, record=True)
         finally:
-            stage.close()
+            setup.close()
         frames.append(list(map(frame, episode.frames)))
     assert frames[0] == frames[1]
     assert len(frames[0]) > 20
@@ -107,13 +109,13 @@ def test_everybody_is_shown_views_and_the_rest_the_truth(
     """The same views for choosing and for learning, one for each observer, the truth beside."""
     plan, site = staged("crossing", ego="time-gap", routes="auto", testers=2,
                         ego_sensor={"range_m": 20.0}, tester_sensor=BAD_EYES)  # fmt: skip
-    stage, agents = set_stage(plan.scenario, site), [Witness(), Witness()]
+    setup, agents = make_setup(plan.scenario, site), [Witness(), Witness()]
     try:
-        performance = Performance(stage, agents, episode_seed(1, 0))
-        assert len(performance.snapshot.lights) == len(site.lights)
+        loop = EpisodeLoop(setup, agents, episode_seed(1, 0))
+        assert len(loop.snapshot.lights) == len(site.lights)
         for step in range(60):
-            truth, views = performance.snapshot, performance.agent_views
-            performance.step()
+            truth, views = loop.snapshot, loop.agent_views
+            loop.step()
             assert truth.unseen is None
             assert [a.seen[-1] for a in agents] == list(views)
             for i, view in enumerate(views):
@@ -125,10 +127,10 @@ def test_everybody_is_shown_views_and_the_rest_the_truth(
         for agent in agents:
             assert [a for a, _ in agent.fed] == agent.seen
             assert [b for _, b in agent.fed][:-1] == agent.seen[1:]
-        assert performance.ego_view.ego == performance.snapshot.ego
-        assert len(performance.ego_view.background) < len(performance.snapshot.background)
+        assert loop.ego_view.ego == loop.snapshot.ego
+        assert len(loop.ego_view.background) < len(loop.snapshot.background)
     finally:
-        stage.close()
+        setup.close()
 
 
 @pytest.mark.parametrize("agent", sorted(set(AGENTS) - {"noop"}))

@@ -11,14 +11,14 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from cavsumo.agents import AGENTS, Scene
-from cavsumo.bodies import PEDESTRIAN
+from cavsumo.agents.observations import TeamObserver, entries
 from cavsumo.egos.base import EGO_KIND
-from cavsumo.observations import Observer, entries
-from cavsumo.scenario import BatchPlan
-from cavsumo.simulator import Performance
-from cavsumo.site import Site
-from cavsumo.snapshot import Snapshot
-from cavsumo.stage import set_stage
+from cavsumo.model.bodies import PEDESTRIAN
+from cavsumo.model.scenario import BatchPlan
+from cavsumo.model.snapshot import Snapshot
+from cavsumo.network.site import Site
+from cavsumo.simulation.loop import EpisodeLoop
+from cavsumo.simulation.setup import make_setup
 
 Snapshots = Callable[..., Snapshot]
 HALF_EGO, HALF_STRIP = EGO_KIND.length / 2, EGO_KIND.width / 2
@@ -27,7 +27,7 @@ DEEP, BROAD = PEDESTRIAN.length, PEDESTRIAN.width
 
 def shown(scene: Scene, snapshot: Snapshot, team: tuple[int, ...] = (0,)) -> dict[str, float]:
     """The entries by their names."""
-    observer = Observer(scene, team)
+    observer = TeamObserver(scene, team)
     return dict(zip(observer.names, observer.vector(snapshot).tolist(), strict=True))
 
 
@@ -119,7 +119,7 @@ def test_whatever_happens_every_entry_is_within_its_bounds(
     """Ego and body anywhere, at any speed: finite numbers within finite bounds, in float32."""
     scene = straight_scene([(30.0, -5.15, 0.0), (40.0, 5.15, math.pi)])
     other = (40.0, 5.15, 0.0, math.pi)
-    observer = Observer(scene, (0,))
+    observer = TeamObserver(scene, (0,))
     vector = observer.vector(scene_snapshot(scene, ego, [body, other]))
     assert vector.dtype == observer.low.dtype == observer.high.dtype == np.float32
     assert np.all(np.isfinite(observer.low) & np.isfinite(observer.high))
@@ -131,17 +131,17 @@ def test_whatever_happens_every_entry_is_within_its_bounds(
 def test_an_episode_is_seen_whole(staged: Callable[..., tuple[BatchPlan, Site]], kind: str) -> None:
     """In SUMO, on foot and on wheels, each entry stays finite from the start to the end."""
     plan, site = staged("crossing", kind=kind, testers=2, end=20.0)
-    stage = set_stage(plan.scenario, site)
+    setup = make_setup(plan.scenario, site)
     try:
-        agents = [AGENTS.make("timing", {}) for _ in stage.teams]
-        performance = Performance(stage, agents, 5)
-        observer = Observer(performance.scene, stage.teams[0])
+        agents = [AGENTS.make("timing", {}) for _ in setup.teams]
+        loop = EpisodeLoop(setup, agents, 5)
+        observer = TeamObserver(loop.scene, setup.teams[0])
         seen = []
-        while not performance.over:
-            seen.append(observer.vector(performance.snapshot))
-            performance.step()
+        while not loop.over:
+            seen.append(observer.vector(loop.snapshot))
+            loop.step()
     finally:
-        stage.close()
+        setup.close()
     table = np.array(seen)
     assert np.isfinite(table).all()
     ahead = table[:, observer.names.index("body0.ahead_m")]

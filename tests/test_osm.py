@@ -12,13 +12,13 @@ from pathlib import Path
 
 import pytest
 
-from cavsumo import netconvert as program
 from cavsumo.cli import main
 from cavsumo.errors import InputError
-from cavsumo.facts import facts
-from cavsumo.handedness import warning
-from cavsumo.network import read_network
-from cavsumo.osm import find_roads, parse_box, read_items
+from cavsumo.network.facts import facts
+from cavsumo.network.osm import netconvert as program
+from cavsumo.network.osm.extract import find_roads, parse_box, read_items
+from cavsumo.network.osm.handedness import warning
+from cavsumo.network.reader import read_network
 
 CROSSROADS = Path(__file__).parent / "data" / "crossroads.osm"
 WEST_HALF = "121.3970,31.1980,121.3989,31.2020"  # the junction without traffic lights
@@ -197,10 +197,10 @@ def test_a_network_that_differs_is_replaced_only_when_told(
 
 def test_pedestrian_signals_are_an_option_of_netconvert() -> None:
     """--keep-pedestrian-signals leaves out what discards them."""
-    from cavsumo.commands.import_osm import Order, _options
+    from cavsumo.cli.commands.import_osm import ImportOptions, _options
 
     for keep in (False, True):
-        order = Order(CROSSROADS, Path("x.net.xml"), None, False, keep, False, False, 60.0)
+        order = ImportOptions(CROSSROADS, Path("x.net.xml"), None, False, keep, False, False, 60.0)
         assert ("tls.discard-simple" in _options(order, None)) != keep
 
 

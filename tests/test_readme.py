@@ -12,9 +12,9 @@ from pathlib import Path
 
 import pytest
 
-from cavsumo.checked import Manner, checked
-from cavsumo.cli import _parser
-from cavsumo.cli_settings import parts_of
+from cavsumo.batch.preflight import Manner, checked
+from cavsumo.cli.command_line import _parser
+from cavsumo.cli.scenario_settings import parts_of
 
 ROOT = Path(__file__).resolve().parents[1]
 FILES = ("README.md", "docs/guide.md")

@@ -8,15 +8,15 @@ from collections.abc import Callable, Sequence
 
 import pytest
 
-from cavsumo.bodies import CAR
-from cavsumo.counterfactual import latest
+from cavsumo.assertions.metrics.rss import rss_longitudinal
 from cavsumo.egos.base import EGO_KIND
-from cavsumo.metrics.rss import rss_longitudinal
-from cavsumo.references import REFERENCES, Reference
-from cavsumo.references.encounter import Encounter, encounter, lasting_conflict
-from cavsumo.references.rss import dangerous
-from cavsumo.scene import Scene
-from cavsumo.snapshot import Snapshot
+from cavsumo.egos.reference import REFERENCES, Reference
+from cavsumo.egos.reference.encounter import Encounter, encounter, lasting_conflict
+from cavsumo.egos.reference.rss import dangerous
+from cavsumo.model.bodies import CAR
+from cavsumo.model.scene import Scene
+from cavsumo.model.snapshot import Snapshot
+from cavsumo.simulation.avoidability import latest
 
 G = 9.80665
 LANE_Y = -1.825  # of the ego on the straight road [m]

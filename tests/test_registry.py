@@ -9,10 +9,10 @@ import pytest
 
 from cavsumo.agents import AGENTS
 from cavsumo.assertions import ASSERTIONS
-from cavsumo.checks import number
 from cavsumo.egos import EGOS
 from cavsumo.errors import InputError, UnknownName
-from cavsumo.registry import Registry
+from cavsumo.model.checks import number
+from cavsumo.model.registry import Registry
 
 SHIPPED = [(r, name) for r in (AGENTS, EGOS, ASSERTIONS) for name in r]
 NAMES = [f"{r.sort}-{name}" for r, name in SHIPPED]

@@ -13,16 +13,17 @@ from typing import Any
 
 import pytest
 
-from cavsumo.checked import Manner
+from cavsumo.batch.executors import Means
+from cavsumo.batch.preflight import Manner
+from cavsumo.batch.prepared import prepare
+from cavsumo.batch.replay import Record, compare, located, recorded, recorded_alone, replayed
+from cavsumo.batch.worker import Worker
 from cavsumo.cli import main
-from cavsumo.commands.replay import Wanted, replay
-from cavsumo.commands.run import run
+from cavsumo.cli.commands.replay import ReplayOptions, replay
+from cavsumo.cli.commands.run import run
 from cavsumo.errors import DivergenceError, Exit, InputError, ResultsError
-from cavsumo.executors import Means
-from cavsumo.outcomes import COLUMNS, Outcome
-from cavsumo.replays import Record, compare, located, recorded, recorded_alone, replayed
-from cavsumo.setting import prepare
-from cavsumo.worker import Worker
+from cavsumo.results.columns import COLUMNS
+from cavsumo.results.rows import Outcome
 
 Frames = list[dict[str, Any]]
 RUN = 1  # the episode that is played again
@@ -172,7 +173,7 @@ def test_the_command_says_the_same(
     recording: Recording, capsys: pytest.CaptureFixture[str]
 ) -> None:
     """cavsumo replay of an untouched record: exit status 0 and one line that says so."""
-    assert replay(recording.csv_file, Wanted(RUN)) == Exit.OK
+    assert replay(recording.csv_file, ReplayOptions(RUN)) == Exit.OK
     said = capsys.readouterr()
     verdict, n = recording.row["outcome"], len(recording.frames)
     assert said.out == f"run 1 (timing): {verdict}, {n} frames: the same\n"
@@ -206,7 +207,7 @@ def test_another_network_than_recorded_is_pointed_out(
     manifest["sha256"][net] = "0" * 64
     manifest["versions"]["libsumo"] = "1.0.0"
     file.with_suffix(".json").write_text(json.dumps(manifest), encoding="utf-8")
-    assert replay(file, Wanted(RUN)) == Exit.OK
+    assert replay(file, ReplayOptions(RUN)) == Exit.OK
     said = capsys.readouterr().err
     assert f"{net} was {'0' * 64}" in said
     assert "libsumo was 1.0.0" in said
@@ -217,7 +218,7 @@ def test_a_learners_episode_can_be_replayed(networks: dict[str, Path], tmp_path:
     file = tmp_path / "learning.csv"
     settings = {"net": networks["pedestrians"], "agents": ["noop", "q-learning"], "runs": 3}
     run(settings | {"trace": "all", "end": 5.0}, file, Means(), Manner(quiet=True, exit_zero=True))
-    assert replay(file, Wanted(5)) == Exit.OK
+    assert replay(file, ReplayOptions(5)) == Exit.OK
     alone = file.with_suffix("") / "run000005.jsonl"
     assert replay(alone) == Exit.OK  # what it knew before is in its trace
 
@@ -249,7 +250,7 @@ def test_damaged_records_are_refused(
         change = {"another format": {"format": "x"}, "no plan": {"plan": {}}}.get(damage, {})
         file.with_suffix(".json").write_text(json.dumps(manifest | change), encoding="utf-8")
     with pytest.raises(ResultsError, match=words) as error:
-        replay(file, Wanted(7 if damage == "no such run" else RUN))
+        replay(file, ReplayOptions(7 if damage == "no such run" else RUN))
     assert "\n" not in str(error.value)
 
 
@@ -339,7 +340,7 @@ def test_a_lone_trace_needs_its_very_files(
 ) -> None:
     """Missing, or with another checksum: one sentence that names the file and the way out."""
     file = _sent(recording, tmp_path)
-    wanted = Wanted(net=networks["junction"]) if absent == "other" else Wanted()
+    wanted = ReplayOptions(net=networks["junction"]) if absent == "other" else ReplayOptions()
     if absent != "other":
         (tmp_path / f"crossing.{'net' if absent == 'net' else 'rou'}.xml").unlink()
     with pytest.raises(InputError) as error:

@@ -16,13 +16,14 @@ import pytest
 
 from cavsumo.cli import main
 from cavsumo.errors import InputError
-from cavsumo.jobs import episode_seed
-from cavsumo.outcomes import COLUMNS, row_line
+from cavsumo.model.seeds import episode_seed
 from cavsumo.report.analysis import Report, analyse
 from cavsumo.report.events import side_ahead, side_hit
 from cavsumo.report.formats import FORMATS
-from cavsumo.results import FORMAT, HEADER, read_rows
-from cavsumo.traces import read_moments, read_trace, trace_text
+from cavsumo.results.columns import COLUMNS
+from cavsumo.results.reading import FORMAT, HEADER, read_rows
+from cavsumo.results.rows import row_line
+from cavsumo.results.traces import read_moments, read_trace, trace_text
 
 Says = Callable[..., str]
 Row = dict[str, Any]

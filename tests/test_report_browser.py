@@ -14,8 +14,8 @@ import pytest
 from support import LAPTOP, PHONE
 
 from cavsumo.report.analysis import analyse
-from cavsumo.report.page.document import write_report
-from cavsumo.results import HEADER
+from cavsumo.report.pages.report.document import write_report
+from cavsumo.results.reading import HEADER
 
 Opened = Callable[..., Any]
 SHOWN = """() => Array.from(document.querySelectorAll(".map > svg circle"))

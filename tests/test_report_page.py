@@ -16,15 +16,15 @@ from test_report import ERROR, FAILED, HELD, JUDGED, NOTHING, SOME, UNFAIR, writ
 from cavsumo.cli import main
 from cavsumo.errors import InputError
 from cavsumo.report.analysis import analyse
-from cavsumo.report.page.document import write_report
-from cavsumo.report.page.links import chosen
-from cavsumo.report.page.places import FAILED as TRIGGER
-from cavsumo.report.page.places import IMPACT, PASSED, Spot, maps, merged
-from cavsumo.report.page.plots import Bar, ratios_plot, shares_plot, survival_plot
-from cavsumo.report.page.scenes import scenes
-from cavsumo.report.page.words import answers, certainty, excluded, headline
+from cavsumo.report.pages.report.document import write_report
+from cavsumo.report.pages.report.links import chosen
+from cavsumo.report.pages.report.places import FAILED as TRIGGER
+from cavsumo.report.pages.report.places import IMPACT, PASSED, Spot, maps, merged
+from cavsumo.report.pages.report.plots import Bar, ratios_plot, shares_plot, survival_plot
+from cavsumo.report.pages.report.scenes import scenes
+from cavsumo.report.pages.report.words import answers, certainty, excluded, headline
 from cavsumo.report.survival import kaplan_meier
-from cavsumo.results import read_rows
+from cavsumo.results.reading import read_rows
 
 Page = Callable[..., str]
 

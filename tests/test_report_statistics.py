@@ -30,7 +30,7 @@ from cavsumo.report.pairs import (
     sequential_ratio_interval,
 )
 from cavsumo.report.survival import Curve, kaplan_meier, median, restricted_mean
-from cavsumo.statistics import rate, sequential_p, sequential_rate
+from cavsumo.results.statistics import rate, sequential_p, sequential_rate
 
 CALM = settings(deadline=None, max_examples=50)
 COUNTS = st.integers(1, 2000).flatmap(lambda n: st.tuples(st.integers(0, n), st.just(n)))

@@ -15,15 +15,15 @@ from typing import Any
 import pytest
 from support import PATIENCE_S, alive, content, rows, traces, until, workers_of
 
-from cavsumo import learning
+from cavsumo.batch import learning
+from cavsumo.batch.batch_run import BatchRun
+from cavsumo.batch.executors import local_executor
+from cavsumo.batch.prepared import PreparedBatch, manifest, prepare
 from cavsumo.cli import main
 from cavsumo.errors import BatchError
-from cavsumo.executors import local_executor
-from cavsumo.recorder import Recorder
-from cavsumo.results import read_manifest
-from cavsumo.scenario import plan_from
-from cavsumo.session import Session
-from cavsumo.setting import Setting, manifest, prepare
+from cavsumo.model.scenario import plan_from
+from cavsumo.results.reading import read_manifest
+from cavsumo.results.writing import Recorder
 
 RUNS = 9
 DOOMED = (1, 3)  # episodes whose starts can be made fatal
@@ -136,22 +136,24 @@ def executor() -> Iterator[Executor]:
 
 
 @pytest.fixture(scope="module")
-def setting(settings: dict[str, Any]) -> Setting:
+def prepared(settings: dict[str, Any]) -> PreparedBatch:
     """The batch, set up once."""
     return prepare(plan_from(settings, "test"))
 
 
 @pytest.fixture(scope="module")
-def quiet(setting: Setting, executor: Executor, tmp_path_factory: pytest.TempPathFactory) -> Path:
+def quiet(
+    prepared: PreparedBatch, executor: Executor, tmp_path_factory: pytest.TempPathFactory
+) -> Path:
     """The batch that nobody disturbed."""
     file = tmp_path_factory.mktemp("quiet") / "results.csv"
-    play(setting, file, executor)
+    play(prepared, file, executor)
     assert traces(file)
     return file
 
 
 def play(
-    setting: Setting,
+    prepared: PreparedBatch,
     file: Path,
     executor: Executor,
     *,
@@ -160,20 +162,20 @@ def play(
     stopped: Callable[[], bool] = never,
 ) -> None:
     """What ``cavsumo run`` does, with processes that stay for the next batch."""
-    now = manifest(setting)
+    now = manifest(prepared)
     with Recorder(file) as recorder:
-        session = Session(setting, recorder, executor, 2, stopped)
+        batch_run = BatchRun(prepared, recorder, executor, 2, stopped)
         if resume or retry:
-            session.resume(read_manifest(file) | {"plan": now["plan"]})
+            batch_run.resume(read_manifest(file) | {"plan": now["plan"]})
         else:
-            session.begin(now)
+            batch_run.begin(now)
         try:
             if retry:
-                session.retry()
+                batch_run.retry()
             if resume or not retry:
-                session.play()
+                batch_run.play()
         finally:
-            session.end()
+            batch_run.end()
 
 
 # Killed -------------------------------------------------------------------------------------------
@@ -208,7 +210,7 @@ class Killed(BaseException):
 
 @pytest.mark.parametrize("count", [1, 15])
 def test_what_was_learned_is_caught_up_from_the_last_note(
-    setting: Setting,
+    prepared: PreparedBatch,
     executor: Executor,
     quiet: Path,
     tmp_path: Path,
@@ -225,16 +227,16 @@ def test_what_was_learned_is_caught_up_from_the_last_note(
         return False
 
     with Recorder(file) as recorder:
-        session = Session(setting, recorder, executor, 2, cut)
-        session.begin(manifest(setting))
+        batch_run = BatchRun(prepared, recorder, executor, 2, cut)
+        batch_run.begin(manifest(prepared))
         with pytest.raises(Killed):
-            session.play()
+            batch_run.play()
     cut_off = read_manifest(file)
     assert cut_off["status"] == "running"
     assert ("learned" in cut_off) == (len(rows(file)) >= 8)
     assert rows(file) == rows(quiet)[: len(rows(file))]
     assert len(rows(file)) < 2 * RUNS
-    play(setting, file, executor, resume=True)
+    play(prepared, file, executor, resume=True)
     assert_same(file, quiet)
 
 
@@ -310,12 +312,16 @@ def test_a_second_interrupt_ends_at_once(networks: Mapping[str, Path], tmp_path:
 
 
 def test_more_episodes_can_be_asked_for_later(
-    settings: dict[str, Any], setting: Setting, executor: Executor, quiet: Path, tmp_path: Path
+    settings: dict[str, Any],
+    prepared: PreparedBatch,
+    executor: Executor,
+    quiet: Path,
+    tmp_path: Path,
 ) -> None:
     """A batch that was extended is the longer one, what was learned included."""
     file = tmp_path / "results.csv"
     play(prepare(plan_from({**settings, "runs": 3}, "test")), file, executor)
-    play(setting, file, executor, resume=True)
+    play(prepared, file, executor, resume=True)
     assert_same(file, quiet)
 
 
@@ -449,7 +455,7 @@ class Drill:
         settings: dict[str, Any] = {"net": Path("networks/pedestrians.net.xml").resolve()}
         settings |= {"routes": "none", "ego": "mortal:Mortal", "ego_params": {"doom": str(doom)}}
         settings |= {"agents": agents, "testers": 2, "runs": 5, "end": 8.0, "trace": "all"}
-        self.setting = prepare(plan_from(settings, "test"))
+        self.prepared = prepare(plan_from(settings, "test"))
         self.doom, self.executor = doom, executor
         self.quiet, self.failed = folder / "quiet" / "results.csv", folder / "failed/results.csv"
         for file in (self.quiet, self.failed):
@@ -469,7 +475,7 @@ class Drill:
 
     def play(self, file: Path, **how: Any) -> None:
         """Play the batch into a file, or what is to be done with the one there."""
-        play(self.setting, file, self.executor, **how)
+        play(self.prepared, file, self.executor, **how)
 
 
 @pytest.fixture(scope="module")

@@ -7,9 +7,9 @@ from pathlib import Path
 
 import pytest
 
-from cavsumo.config import read_config
 from cavsumo.errors import InputError, UnknownName
-from cavsumo.scenario import BatchPlan, plan_from
+from cavsumo.model.scenario import BatchPlan, plan_from
+from cavsumo.model.scenario_file import read_config
 
 
 @pytest.fixture

@@ -13,14 +13,14 @@ import pytest
 from shapely.geometry import LineString, Point
 
 from cavsumo import cli
-from cavsumo.bodies import BICYCLE, PEDESTRIAN, Kind
-from cavsumo.ego_routes import TURNS
 from cavsumo.errors import InputError, NetworkError, UnknownName
-from cavsumo.kerbs import STRIP_M
-from cavsumo.results import read_rows
-from cavsumo.scenario import BatchPlan
-from cavsumo.site import Site
-from cavsumo.starts import draw_starts
+from cavsumo.model.bodies import BICYCLE, PEDESTRIAN, Kind
+from cavsumo.model.scenario import BatchPlan
+from cavsumo.network.ego_routes import TURNS
+from cavsumo.network.jaywalk_starts import STRIP_M
+from cavsumo.network.pedestrian_starts import draw_starts
+from cavsumo.network.site import Site
+from cavsumo.results.reading import read_rows
 
 Staged = Callable[..., tuple[BatchPlan, Site]]
 # Which way a path turns between its ends [degrees].

@@ -13,14 +13,14 @@ from cavsumo.agents.driving import Course
 from cavsumo.agents.election import ElectionAgent
 from cavsumo.agents.manoeuvres import everybody
 from cavsumo.agents.programmed import ProximityAgent
-from cavsumo.bodies import BICYCLE, CAR, PEDESTRIAN, Body
 from cavsumo.egos.base import EGO_KIND
 from cavsumo.egos.time_gap import TimeGapEgo
-from cavsumo.paths import Path
-from cavsumo.roads import Light, Start
-from cavsumo.scene import Scene
-from cavsumo.sensors import Observer, Sensor
-from cavsumo.snapshot import BodyState, RawState, Snapshot
+from cavsumo.model.bodies import BICYCLE, CAR, PEDESTRIAN, Body
+from cavsumo.model.carriageway import Light, Start
+from cavsumo.model.polyline import Path
+from cavsumo.model.scene import Scene
+from cavsumo.model.sensors import Observer, Sensor
+from cavsumo.model.snapshot import BodyState, RawState, Snapshot
 
 EGO = Body("ego", EGO_KIND)
 LIGHTS = (Light("near", 0, 20.0), Light("far", 1, 80.0))

@@ -9,13 +9,13 @@ import pytest
 
 from cavsumo.assertions import ASSERTIONS, Judgement, make_assertions
 from cavsumo.assertions.base import HELD, NOT_TRIGGERED, UNFAIR, VIOLATED, weightiest
+from cavsumo.batch.tally import Tally
 from cavsumo.cli import main
-from cavsumo.config import read_config
 from cavsumo.errors import InputError, UnknownName
-from cavsumo.outcomes import verdicts_cell, verdicts_of
-from cavsumo.results import read_rows
-from cavsumo.scenario import plan_from
-from cavsumo.tally import Tally
+from cavsumo.model.scenario import plan_from
+from cavsumo.model.scenario_file import read_config
+from cavsumo.results.reading import read_rows
+from cavsumo.results.rows import verdicts_cell, verdicts_of
 
 NAMES = ("reaction-zone", "stopping-distance", "speed-limit")
 

@@ -10,14 +10,14 @@ from pathlib import Path
 import libsumo
 import pytest
 
-from cavsumo.bodies import PEDESTRIAN, Body
-from cavsumo.demand import types_only
-from cavsumo.outcomes import is_test
-from cavsumo.results import read_rows
-from cavsumo.roads import Start
-from cavsumo.scenario import SHARED_BY, Simulation
-from cavsumo.snapshot import BodyState, Snapshot
-from cavsumo.world import World
+from cavsumo.model.bodies import PEDESTRIAN, Body
+from cavsumo.model.carriageway import Start
+from cavsumo.model.scenario import SHARED_BY, Simulation
+from cavsumo.model.snapshot import BodyState, Snapshot
+from cavsumo.results.reading import read_rows
+from cavsumo.results.rows import is_test
+from cavsumo.sumo.demand import types_only
+from cavsumo.sumo.world import World
 
 Opener = Callable[..., World]
 # An ego whose driver draws no random numbers of SUMO's.

@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.stats import binom, binomtest
 
-from cavsumo.statistics import lower_bound, rate
+from cavsumo.results.statistics import lower_bound, rate
 
 CALM = settings(deadline=None)
 

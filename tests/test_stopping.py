@@ -14,16 +14,16 @@ import numpy as np
 import pytest
 from support import Troupe, rows
 
+from cavsumo.batch.batch_run import BatchRun
+from cavsumo.batch.executors import local_executor
+from cavsumo.batch.prepared import manifest, prepare
+from cavsumo.batch.stopping import looks_at_rows
 from cavsumo.cli import main
 from cavsumo.errors import InputError
-from cavsumo.executors import local_executor
-from cavsumo.recorder import Recorder
-from cavsumo.results import read_manifest
-from cavsumo.scenario import plan_from
-from cavsumo.session import Session
-from cavsumo.setting import manifest, prepare
-from cavsumo.statistics import rate, sequential_rate
-from cavsumo.stopping import looks_at_rows
+from cavsumo.model.scenario import plan_from
+from cavsumo.results.reading import read_manifest
+from cavsumo.results.statistics import rate, sequential_rate
+from cavsumo.results.writing import Recorder
 
 RUNS = 12
 AGENTS = ["timing", "election"]
@@ -46,13 +46,13 @@ def play(settings: dict[str, Any]) -> Iterator[Play]:
     own = prepare(plan_from(settings, "test"))
 
     def played(file: Path, jobs: int = 2, *, resume: bool = False, **rules: Any) -> Path:
-        setting = prepare(plan_from({**settings, **rules}, "test"))
+        prepared = prepare(plan_from({**settings, **rules}, "test"))
         with Recorder(file) as recorder:
-            session = Session(setting, recorder, troupes[jobs], jobs, lambda: False)
-            now = manifest(setting)
-            session.resume(read_manifest(file)) if resume else session.begin(now)
-            session.play()
-            session.end()
+            batch_run = BatchRun(prepared, recorder, troupes[jobs], jobs, lambda: False)
+            now = manifest(prepared)
+            batch_run.resume(read_manifest(file)) if resume else batch_run.begin(now)
+            batch_run.play()
+            batch_run.end()
         return file
 
     with local_executor(1) as one, local_executor(2) as two:

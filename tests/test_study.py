@@ -13,14 +13,14 @@ from pathlib import Path
 import pytest
 from support import PATIENCE_S, content, rows, until
 
+from cavsumo.batch.prepared import prepare
+from cavsumo.batch.summary import interval
 from cavsumo.cli import main
 from cavsumo.errors import InputError
-from cavsumo.results import read_manifest
-from cavsumo.scenario import plan_from
-from cavsumo.setting import prepare
-from cavsumo.statistics import rate
-from cavsumo.study import Choice, Part, overruled, product, read_study
-from cavsumo.summary import interval
+from cavsumo.model.scenario import plan_from
+from cavsumo.model.study import Choice, Part, overruled, product, read_study
+from cavsumo.results.reading import read_manifest
+from cavsumo.results.statistics import rate
 
 ROOT = Path(__file__).parents[1]
 Write = Callable[[str], Path]
@@ -308,12 +308,12 @@ def test_the_experiment_can_be_played() -> None:
         f"{place}-testers{n}" for place in ("straight", "crossing", "junction") for n in (1, 3, 6)
     ]
     for part in parts:
-        setting = prepare(plan_from(part.settings, part.name))
-        plan = setting.plan
+        prepared = prepare(plan_from(part.settings, part.name))
+        plan = prepared.plan
         assert (plan.runs, plan.trace) == (250, "none")
         assert plan.cast["nearest"] == "election"
         assert plan.agent_params("nearest", ["rule"])["rule"] == "unsigned"
-        assert setting.site.demand is None
+        assert prepared.site.demand is None
         assert (plan.scenario.routes is None) == part.name.startswith("straight")
 
 

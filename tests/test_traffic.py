@@ -15,22 +15,22 @@ import libsumo
 import pytest
 
 from cavsumo import cli
-from cavsumo.demand import BEYOND_S
-from cavsumo.network import driving_lanes, is_pavement, read_network
-from cavsumo.results import read_manifest, read_rows
-from cavsumo.scenario import BatchPlan, Simulation, plan_from
-from cavsumo.setting import prepare
-from cavsumo.site import Site
-from cavsumo.traffic import APART_M, CLEAR_M
-from cavsumo.world import World
+from cavsumo.batch.prepared import prepare
+from cavsumo.model.scenario import BatchPlan, Simulation, plan_from
+from cavsumo.network.reader import driving_lanes, is_pavement, read_network
+from cavsumo.network.site import Site
+from cavsumo.network.traffic import APART_M, CLEAR_M
+from cavsumo.results.reading import read_manifest, read_rows
+from cavsumo.sumo.demand import BEYOND_S
+from cavsumo.sumo.world import World
 
 Staged = Callable[..., tuple[BatchPlan, Site]]
 Opener = Callable[..., World]
 ALL = pytest.mark.parametrize("name", ["pedestrians", "crossing", "junction"])
 SHARES = """
 import hashlib, sys
-from cavsumo.scenario import plan_from
-from cavsumo.setting import prepare
+from cavsumo.model.scenario import plan_from
+from cavsumo.batch.prepared import prepare
 for name in sys.argv[2:]:
     site = prepare(plan_from({"net": name, "traffic": 12, "seed": int(sys.argv[1])}, "t")).site
     print(hashlib.sha256(site.demand.encode()).hexdigest())

@@ -12,10 +12,10 @@ import numpy as np
 import pytest
 from support import rows
 
+from cavsumo.agents.observations import entries
+from cavsumo.agents.policy_file import read_policy
 from cavsumo.cli import main
-from cavsumo.observations import entries
-from cavsumo.policies import read_policy
-from cavsumo.statistics import Rate, rate
+from cavsumo.results.statistics import Rate, rate
 
 ROOT = Path(__file__).resolve().parents[1]
 EXAMPLE = ROOT / "examples" / "train_tester"

@@ -12,22 +12,22 @@ from shapely.geometry import LineString, box
 from staging import Stage
 
 from cavsumo.assertions.base import Judgement
-from cavsumo.bodies import CAR, PEDESTRIAN, Body, Kind
-from cavsumo.conduct import Conduct
-from cavsumo.contacts import ContactMonitor, depth
-from cavsumo.geometry import Box
-from cavsumo.kinematics import step_floats
-from cavsumo.paths import Path
+from cavsumo.assertions.contacts import ContactMonitor, depth
+from cavsumo.assertions.naturalness import Naturalness
+from cavsumo.assertions.validity import STRAY_M, Breach, ValidityMonitor, possible
+from cavsumo.batch.episode_runner import measured
+from cavsumo.batch.tally import Tally
+from cavsumo.model.bodies import CAR, PEDESTRIAN, Body, Kind
+from cavsumo.model.carriageway import Roads, Start
+from cavsumo.model.geometry import Box
+from cavsumo.model.kinematics import step_floats
+from cavsumo.model.polyline import Path
+from cavsumo.model.scenario import BatchPlan
+from cavsumo.model.scene import Scene
+from cavsumo.model.snapshot import BodyState, Snapshot
+from cavsumo.network.site import Site
 from cavsumo.report.rates import rates
-from cavsumo.rewards import GOAL, Ledger
-from cavsumo.roads import Roads, Start
-from cavsumo.scenario import BatchPlan
-from cavsumo.scene import Scene
-from cavsumo.site import Site
-from cavsumo.snapshot import BodyState, Snapshot
-from cavsumo.tally import Tally
-from cavsumo.theatre import measured
-from cavsumo.validity import STRAY_M, Breach, Umpire, possible
+from cavsumo.simulation.rewards import GOAL, RewardMonitor
 
 DT = 0.1
 LEFT = math.pi / 2  # across the ego's way
@@ -52,7 +52,7 @@ def judged(
     driver = Body("ego", CAR)
     starts = tuple(Start(x, y, o) for x, y, _, o in moments[0])
     path = Path([(0.0, 0.0), (100.0, 0.0)])
-    umpire = Umpire(Scene(DT, driver, path, bodies, starts, roads))
+    monitor = ValidityMonitor(Scene(DT, driver, path, bodies, starts, roads))
     contacts = ContactMonitor()
     walker = Body("walker", PEDESTRIAN)
     for step, poses in enumerate(moments):
@@ -60,8 +60,8 @@ def judged(
         others = ((walker, *traffic[step]),) if traffic else ()
         snapshot = Snapshot(step, step * DT, BodyState(driver, *ego), 0.0, testers, others)
         contacts.observe(snapshot)
-        umpire.observe(snapshot, contacts.pairs)
-    return str(umpire.first or "")
+        monitor.observe(snapshot, contacts.pairs)
+    return str(monitor.first or "")
 
 
 def walk(*poses: Pose, steps: int = 12) -> list[list[Pose]]:
@@ -124,14 +124,14 @@ def _with_ego(moments: list[list[Pose]], egos: list[Pose]) -> str:
     """What the umpire says of one pedestrian while the ego moves too."""
     body, driver = Body("tester0", PEDESTRIAN), Body("ego", CAR)
     path = Path([(0.0, 0.0), (100.0, 0.0)])
-    umpire = Umpire(Scene(DT, driver, path, (body,), (Start(0.0, -1.3, LEFT),), ROADS))
+    monitor = ValidityMonitor(Scene(DT, driver, path, (body,), (Start(0.0, -1.3, LEFT),), ROADS))
     contacts = ContactMonitor()
     for step, ((pose,), ego) in enumerate(zip(moments, egos, strict=True)):
         state = BodyState(driver, *ego)
         snapshot = Snapshot(step, step * DT, state, 0.0, (BodyState(body, *pose),))
         contacts.observe(snapshot)
-        umpire.observe(snapshot, contacts.pairs)
-    return str(umpire.first or "")
+        monitor.observe(snapshot, contacts.pairs)
+    return str(monitor.first or "")
 
 
 def test_the_edge_of_the_world() -> None:
@@ -169,7 +169,8 @@ def test_a_goal_reached_against_the_rules_earns_nothing() -> None:
     snapshot = Snapshot(1, DT, BodyState(scene.ego, *AWAY), 0.0, (tester,))
     said = [Judgement("collision", "held", "tester0")]
     fair, cheat = (
-        Ledger(scene, ((0,),)).rewards(snapshot, said, cheats) for cheats in ((), ("tester0",))
+        RewardMonitor(scene, ((0,),)).rewards(snapshot, said, cheats)
+        for cheats in ((), ("tester0",))
     )
     assert fair is not None
     assert cheat is not None
@@ -181,9 +182,9 @@ def test_whose_breach_spoils_what() -> None:
     bodies = tuple(Body(f"tester{i}", PEDESTRIAN) for i in range(2))
     starts = (Start(5.0, -4.0, 0.0),) * 2
     path = Path([(0.0, 0.0), (100.0, 0.0)])
-    umpire = Umpire(Scene(DT, Body("ego", CAR), path, bodies, starts, ROADS))
-    assert umpire.spoils(Judgement("a", "held", "tester0")) is None
-    umpire.breaches["tester0"] = Breach(1.0, "tester0", "left the world")
+    monitor = ValidityMonitor(Scene(DT, Body("ego", CAR), path, bodies, starts, ROADS))
+    assert monitor.spoils(Judgement("a", "held", "tester0")) is None
+    monitor.breaches["tester0"] = Breach(1.0, "tester0", "left the world")
     for verdict, whom, spoilt in (
         ("violated", "tester0", True),
         ("held", "tester1", False),
@@ -191,21 +192,21 @@ def test_whose_breach_spoils_what() -> None:
         ("violated", "bg_car", True),
         ("not_triggered", "", False),
     ):
-        assert bool(umpire.spoils(Judgement("a", verdict, whom))) == spoilt
-    umpire.breaches = {"tester1": Breach(0.0, "tester1", "starts in tester0")}
-    assert umpire.spoils(Judgement("a")) is not None
+        assert bool(monitor.spoils(Judgement("a", verdict, whom))) == spoilt
+    monitor.breaches = {"tester1": Breach(0.0, "tester1", "starts in tester0")}
+    assert monitor.spoils(Judgement("a")) is not None
 
 
 def test_conduct_in_figures() -> None:
     """Two bodies, one of which speeds up and turns in one of two timesteps."""
     bodies = [Body(f"tester{i}", PEDESTRIAN) for i in range(2)]
-    conduct, ego = Conduct(), BodyState(Body("ego", CAR), *AWAY)
+    naturalness, ego = Naturalness(), BodyState(Body("ego", CAR), *AWAY)
     first = tuple(BodyState(body, 0.0, 0.0, 1.0, 3.1) for body in bodies)
     second = (first[0]._replace(v=1.1, o=-3.1), first[1])
     for step, testers in enumerate((first, second, second)):
-        conduct.observe(Snapshot(step, step * DT, ego, 0.0, testers))
-    assert conduct.turning == pytest.approx(2 * math.pi - 6.2)
-    assert conduct.rms_acceleration(2, DT) == pytest.approx(math.sqrt(1.0 / 4))
+        naturalness.observe(Snapshot(step, step * DT, ego, 0.0, testers))
+    assert naturalness.turning == pytest.approx(2 * math.pi - 6.2)
+    assert naturalness.rms_acceleration(2, DT) == pytest.approx(math.sqrt(1.0 / 4))
 
 
 def test_invalid_episodes_are_counted_apart() -> None:

@@ -8,27 +8,27 @@ from typing import Any
 
 import pytest
 
+from cavsumo.batch.jobs import job
+from cavsumo.batch.prepared import prepare
+from cavsumo.batch.worker import Worker
 from cavsumo.errors import InputError
-from cavsumo.jobs import job
-from cavsumo.outcomes import Outcome
-from cavsumo.scenario import plan_from
-from cavsumo.setting import prepare
-from cavsumo.worker import Worker
+from cavsumo.model.scenario import plan_from
+from cavsumo.results.rows import Outcome
 
 SetUp = Callable[..., Any]
 PROGRAMMED = ["timing", "proximity", "programmed-random", "election"]
 
 
-def outcomes(setting: Any, times: int = 1) -> list[Outcome]:
+def outcomes(prepared: Any, times: int = 1) -> list[Outcome]:
     """What the episodes of a batch leave, in one process; several times over if wanted."""
-    with Worker(setting) as worker:
-        todo = [run for _ in range(times) for run in setting.plan.todo()]
-        return [worker.play(job(setting.plan, run))[0] for run in todo]
+    with Worker(prepared) as worker:
+        todo = [run for _ in range(times) for run in prepared.plan.todo()]
+        return [worker.play(job(prepared.plan, run))[0] for run in todo]
 
 
-def rows(setting: Any, times: int = 1) -> list[dict[str, Any]]:
+def rows(prepared: Any, times: int = 1) -> list[dict[str, Any]]:
     """The rows of a batch."""
-    return [outcome.row for outcome in outcomes(setting, times)]
+    return [outcome.row for outcome in outcomes(prepared, times)]
 
 
 @pytest.mark.parametrize("name", ["crossing", "junction"])
@@ -52,8 +52,8 @@ def test_timing_finds_tests(set_up: SetUp) -> None:
 @pytest.mark.parametrize("kind", ["car", "bus", "bicycle"])
 def test_the_same_seed_gives_the_same_rows(set_up: SetUp, kind: str) -> None:
     """Every kind, byte for byte but for the time that it took."""
-    setting = set_up("crossing", kind=kind, agents=["timing", "random"], runs=1)
-    both = rows(setting, times=2)
+    prepared = set_up("crossing", kind=kind, agents=["timing", "random"], runs=1)
+    both = rows(prepared, times=2)
     first, second = both[:2], both[2:]
     for row in (*first, *second):
         row.pop("wall_s")
@@ -64,7 +64,7 @@ def test_the_same_seed_gives_the_same_rows(set_up: SetUp, kind: str) -> None:
 @pytest.mark.parametrize("types", [("crossing",), ("merging",)])
 def test_an_untriggered_vehicle_waits_for_good(set_up: SetUp, types: tuple[str, ...]) -> None:
     """It comes to its line and stands there while the ego passes: no test, no contact."""
-    setting = set_up(
+    prepared = set_up(
         "crossing",
         kind="car",
         approaches=types,
@@ -74,7 +74,7 @@ def test_an_untriggered_vehicle_waits_for_good(set_up: SetUp, types: tuple[str, 
         testers=1,
         trace="all",
     )
-    for outcome in outcomes(setting):
+    for outcome in outcomes(prepared):
         (tester,) = outcome.frames[-1]["testers"].values()
         assert tester[2] < 0.5
         assert outcome.row["outcome"] == "not_triggered"
@@ -94,7 +94,7 @@ def test_at_the_end_of_its_way_a_vehicle_comes_to_rest(
     set_up: SetUp, types: tuple[str, ...]
 ) -> None:
     """Ahead of the ego it stops on the road; who crossed its way stops behind the road's end."""
-    setting = set_up(
+    prepared = set_up(
         "pedestrians" if "following" in types else "crossing",
         kind="car",
         approaches=types,
@@ -105,7 +105,7 @@ def test_at_the_end_of_its_way_a_vehicle_comes_to_rest(
         ego_params={"speed": 0.0},
         trace="all",
     )
-    (tester,) = outcomes(setting)[0].frames[-1]["testers"].values()
+    (tester,) = outcomes(prepared)[0].frames[-1]["testers"].values()
     assert tester[2] < 0.1
     inside = tester[0] + 2.25 <= 99.0
     assert inside or "merging" in types

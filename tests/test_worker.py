@@ -16,14 +16,14 @@ from typing import Any
 import pytest
 from support import PATIENCE_S, alive, until, workers_of
 
-from cavsumo import worker_process
+from cavsumo.batch import worker_process
+from cavsumo.batch.jobs import job
+from cavsumo.batch.prepared import PreparedBatch, prepare
+from cavsumo.batch.worker import Worker
+from cavsumo.batch.worker_process import GOODBYE
 from cavsumo.errors import BatchError, InputError
-from cavsumo.jobs import job
-from cavsumo.outcomes import Outcome
-from cavsumo.scenario import plan_from
-from cavsumo.setting import Setting, prepare
-from cavsumo.worker import Worker
-from cavsumo.worker_process import GOODBYE
+from cavsumo.model.scenario import plan_from
+from cavsumo.results.rows import Outcome
 
 # An ego with a child of its own, whose number it leaves in a file; it waits while ``wait`` exists.
 PARENT = """
@@ -64,7 +64,7 @@ def lasting(outcome: Outcome) -> dict[str, Any]:
 
 
 @pytest.fixture(scope="module")
-def setting(networks: dict[str, Path]) -> Setting:
+def prepared(networks: dict[str, Path]) -> PreparedBatch:
     """Short episodes on the straight road, which must be answered within two seconds."""
     chosen = {"net": networks["pedestrians"], "routes": "none", "end": 3.0, "trace": "none"}
     chosen |= {"agents": ["random"], "runs": 3, "testers": 1, "deadline_s": 2.0}
@@ -72,10 +72,10 @@ def setting(networks: dict[str, Path]) -> Setting:
 
 
 @pytest.fixture(scope="module")
-def quiet(setting: Setting) -> list[dict[str, Any]]:
+def quiet(prepared: PreparedBatch) -> list[dict[str, Any]]:
     """The rows of its batch, undisturbed."""
-    with Worker(setting) as worker:
-        return [lasting(worker.play(job(setting.plan, run))[0]) for run in range(3)]
+    with Worker(prepared) as worker:
+        return [lasting(worker.play(job(prepared.plan, run))[0]) for run in range(3)]
 
 
 @pytest.fixture(autouse=True)
@@ -90,16 +90,16 @@ def nobody_left() -> Iterator[None]:
 
 
 def test_a_process_killed_while_it_waits_costs_one_row_at_most(
-    setting: Setting, quiet: list[dict[str, Any]]
+    prepared: PreparedBatch, quiet: list[dict[str, Any]]
 ) -> None:
     """Nothing was under way: the next episode is played by another process, or is an error."""
-    with Worker(setting) as worker:
-        first, _ = worker.play(job(setting.plan, 0))
+    with Worker(prepared) as worker:
+        first, _ = worker.play(job(prepared.plan, 0))
         pid = only_child()
         os.kill(pid, signal.SIGKILL)
         until(lambda: not alive(pid), "it is dead")
-        second, _ = worker.play(job(setting.plan, 1))
-        third, _ = worker.play(job(setting.plan, 2))
+        second, _ = worker.play(job(prepared.plan, 1))
+        third, _ = worker.play(job(prepared.plan, 2))
         assert only_child() != pid
     assert lasting(first) == quiet[0]
     assert second.row["outcome"] == "error" or lasting(second) == quiet[1]
@@ -107,7 +107,7 @@ def test_a_process_killed_while_it_waits_costs_one_row_at_most(
 
 
 def test_a_process_that_dies_at_its_start_is_started_again(
-    setting: Setting, quiet: list[dict[str, Any]]
+    prepared: PreparedBatch, quiet: list[dict[str, Any]]
 ) -> None:
     """Killed twice before it could say that it is ready: the third one plays."""
     with_killed: list[int] = []
@@ -124,15 +124,15 @@ def test_a_process_that_dies_at_its_start_is_started_again(
 
     killer = threading.Thread(target=kill_two)
     killer.start()
-    with Worker(setting) as worker:
+    with Worker(prepared) as worker:
         killer.join()
-        outcome, _ = worker.play(job(setting.plan, 1))
+        outcome, _ = worker.play(job(prepared.plan, 1))
         assert only_child() not in with_killed
     assert len(with_killed) == 2
     assert lasting(outcome) == quiet[1]
 
 
-def test_a_process_that_never_comes_up_ends_the_batch(setting: Setting) -> None:
+def test_a_process_that_never_comes_up_ends_the_batch(prepared: PreparedBatch) -> None:
     """Killed at every start: one error that says how it died, and no endless restarting."""
     over = threading.Event()
     killed: list[int] = []
@@ -146,7 +146,7 @@ def test_a_process_that_never_comes_up_ends_the_batch(setting: Setting) -> None:
     killer = threading.Thread(target=kill_all)
     killer.start()
     try:
-        with pytest.raises(InputError, match="process died of SIGKILL"), Worker(setting):
+        with pytest.raises(InputError, match="process died of SIGKILL"), Worker(prepared):
             pytest.fail("it started")
     finally:
         over.set()
@@ -155,16 +155,16 @@ def test_a_process_that_never_comes_up_ends_the_batch(setting: Setting) -> None:
 
 
 def test_a_process_that_stopped_is_an_error_and_is_replaced(
-    setting: Setting, quiet: list[dict[str, Any]]
+    prepared: PreparedBatch, quiet: list[dict[str, Any]]
 ) -> None:
     """SIGSTOP, or a machine that swaps for ever: no answer in time is an answer."""
-    with Worker(setting) as worker:
-        worker.play(job(setting.plan, 0))
+    with Worker(prepared) as worker:
+        worker.play(job(prepared.plan, 0))
         pid = only_child()
         os.kill(pid, signal.SIGSTOP)
-        second, _ = worker.play(job(setting.plan, 1))
+        second, _ = worker.play(job(prepared.plan, 1))
         assert not alive(pid)
-        third, _ = worker.play(job(setting.plan, 2))
+        third, _ = worker.play(job(prepared.plan, 2))
     assert second.row["outcome"] == "error"
     assert second.row["error"] == "no answer within 2 s, killed"
     assert second.row["wall_s"] >= 2.0
@@ -172,11 +172,11 @@ def test_a_process_that_stopped_is_an_error_and_is_replaced(
 
 
 def test_closing_ends_an_episode_that_another_thread_waits_for(
-    setting: Setting, controller: Callable[..., str], tmp_path: Path
+    prepared: PreparedBatch, controller: Callable[..., str], tmp_path: Path
 ) -> None:
     """A batch that is given up does not wait for its hanging episode."""
     (tmp_path / "wait").touch()
-    held = held_setting(setting, controller(PARENT), tmp_path)
+    held = held_setting(prepared, controller(PARENT), tmp_path)
     said: list[str] = []
 
     def play() -> None:
@@ -196,19 +196,19 @@ def test_closing_ends_an_episode_that_another_thread_waits_for(
         worker.play(job(held.plan, 1))
 
 
-def held_setting(setting: Setting, module: str, folder: Path) -> Setting:
+def held_setting(prepared: PreparedBatch, module: str, folder: Path) -> PreparedBatch:
     """The batch with an ego that has a child process."""
-    chosen = {"net": setting.plan.scenario.net, "routes": "none", "end": 3.0, "trace": "none"}
+    chosen = {"net": prepared.plan.scenario.net, "routes": "none", "end": 3.0, "trace": "none"}
     chosen |= {"agents": ["random"], "testers": 1, "deadline_s": 600.0}
     chosen |= {"ego": f"{module}:Parent", "ego_params": {"folder": str(folder)}}
     return prepare(plan_from(chosen, "test"))
 
 
 def test_the_children_of_a_controller_die_with_its_process(
-    setting: Setting, controller: Callable[..., str], tmp_path: Path
+    prepared: PreparedBatch, controller: Callable[..., str], tmp_path: Path
 ) -> None:
     """A user's controller that starts a program of its own leaves none behind, hour after hour."""
-    held = held_setting(setting, controller(PARENT), tmp_path)
+    held = held_setting(prepared, controller(PARENT), tmp_path)
     with Worker(held) as worker:
         outcome, _ = worker.play(job(held.plan, 0))
         assert outcome.row["outcome"] != "error", outcome.row["error"]
@@ -225,17 +225,17 @@ def test_the_children_of_a_controller_die_with_its_process(
 
 
 def test_what_a_killed_process_had_on_the_disk_goes(
-    setting: Setting, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    prepared: PreparedBatch, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Temporary files of processes that could not tidy up: a long batch does not fill the disk."""
     monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
-    with Worker(setting) as worker:
-        worker.play(job(setting.plan, 0))
+    with Worker(prepared) as worker:
+        worker.play(job(prepared.plan, 0))
         (folder,) = tmp_path.glob("cavsumo-worker-*")
         (folder / "left").write_text("what a killed process left", encoding="utf-8")
         os.kill(only_child(), signal.SIGKILL)
         for run in (1, 2):  # the kill may cost the first of them
-            worker.play(job(setting.plan, run))
+            worker.play(job(prepared.plan, run))
         assert not folder.exists()
         (folder,) = tmp_path.glob("cavsumo-worker-*")
         (folder / "left").write_text("what is left at the end", encoding="utf-8")
@@ -246,10 +246,10 @@ def test_what_a_killed_process_had_on_the_disk_goes(
 
 
 @pytest.fixture
-def copied(setting: Setting, tmp_path: Path) -> Setting:
+def copied(prepared: PreparedBatch, tmp_path: Path) -> PreparedBatch:
     """The batch on a network file of its own."""
     net = tmp_path / "town.net.xml"
-    shutil.copy(setting.plan.scenario.net, net)
+    shutil.copy(prepared.plan.scenario.net, net)
     chosen = {"net": net, "routes": "none", "end": 3.0, "agents": ["random"], "testers": 1}
     return prepare(plan_from({**chosen, "runs": 3, "trace": "none"}, "test"))
 
@@ -266,7 +266,7 @@ def change(net: Path) -> None:
 
 @pytest.mark.parametrize("happens", [vanish, change])
 def test_a_network_that_changes_in_mid_batch_ends_the_batch(
-    copied: Setting, happens: Callable[[Path], None]
+    copied: PreparedBatch, happens: Callable[[Path], None]
 ) -> None:
     """A process that cannot be replaced is no error row after another until morning."""
     net = copied.plan.scenario.net
@@ -284,7 +284,7 @@ def test_a_network_that_changes_in_mid_batch_ends_the_batch(
         assert net.name in str(caught.value)
 
 
-def test_a_process_that_sees_other_files_says_which(copied: Setting) -> None:
+def test_a_process_that_sees_other_files_says_which(copied: PreparedBatch) -> None:
     """On a machine with another network of the same name nothing is played."""
     net = copied.plan.scenario.net
     change(net)
@@ -294,23 +294,25 @@ def test_a_process_that_sees_other_files_says_which(copied: Setting) -> None:
     assert "expected " + copied.checksums[str(net)] in str(caught.value)
 
 
-def test_a_process_with_another_version_says_which(setting: Setting) -> None:
+def test_a_process_with_another_version_says_which(prepared: PreparedBatch) -> None:
     """On a machine with another SUMO nothing is played."""
-    other = Setting(
-        setting.plan,
-        setting.site,
-        setting.folder,
-        setting.checksums,
-        {**setting.versions, "libsumo": "1.0.0"},
+    other = PreparedBatch(
+        prepared.plan,
+        prepared.site,
+        prepared.folder,
+        prepared.checksums,
+        {**prepared.versions, "libsumo": "1.0.0"},
     )
     with pytest.raises(InputError, match=r"libsumo is .* expected 1\.0\.0"), Worker(other):
         pytest.fail("it started")
 
 
-def test_a_folder_that_is_gone_is_one_sentence(setting: Setting, tmp_path: Path) -> None:
+def test_a_folder_that_is_gone_is_one_sentence(prepared: PreparedBatch, tmp_path: Path) -> None:
     """The working folder of the batch is not there on this machine: named."""
     folder = str(tmp_path / "elsewhere")
-    other = Setting(setting.plan, setting.site, folder, setting.checksums, setting.versions)
+    other = PreparedBatch(
+        prepared.plan, prepared.site, folder, prepared.checksums, prepared.versions
+    )
     with pytest.raises(InputError, match="elsewhere"), Worker(other):
         pytest.fail("it started")
 
@@ -319,12 +321,12 @@ def test_a_folder_that_is_gone_is_one_sentence(setting: Setting, tmp_path: Path)
 
 
 def test_a_process_with_nothing_to_do_says_goodbye(
-    setting: Setting, monkeypatch: pytest.MonkeyPatch
+    prepared: PreparedBatch, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """It goes by itself after a while, so that dask workers and open sessions hold no SUMO."""
     monkeypatch.setattr(worker_process, "IDLE_S", 0.2)
     ours, theirs = Pipe()
-    serving = threading.Thread(target=worker_process._serve, args=(theirs, setting, True))
+    serving = threading.Thread(target=worker_process._serve, args=(theirs, prepared, True))
     serving.start()
     try:
         assert ours.poll(PATIENCE_S)
@@ -342,10 +344,10 @@ IMPATIENT = """
 import sys
 from pathlib import Path
 
-name = "cavsumo.worker_process"
+name = "cavsumo.batch.worker_process"
 if name in sys.orig_argv:
     import cavsumo
-    source = (Path(cavsumo.__file__).parent / "worker_process.py").read_text()
+    source = (Path(cavsumo.__file__).parent / "batch" / "worker_process.py").read_text()
     assert "IDLE_S = 60.0" in source
     sys.argv = sys.orig_argv[sys.orig_argv.index(name):]
     exec(source.replace("IDLE_S = 60.0", "IDLE_S = 0.2"), {"__name__": "__main__"})
@@ -354,14 +356,17 @@ if name in sys.orig_argv:
 
 
 def test_a_process_that_said_goodbye_is_replaced_without_loss(
-    setting: Setting, quiet: list[dict[str, Any]], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    prepared: PreparedBatch,
+    quiet: list[dict[str, Any]],
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     """After a pause longer than it idles the next episode is played as if there had been none."""
     (tmp_path / "sitecustomize.py").write_text(IMPATIENT, encoding="utf-8")
     monkeypatch.syspath_prepend(str(tmp_path))
-    with Worker(setting) as worker:
+    with Worker(prepared) as worker:
         for run in range(3):
             pid = only_child() if run else None
             until(lambda p=pid: p is None or not alive(p), "it went by itself")
-            outcome, _ = worker.play(job(setting.plan, run))
+            outcome, _ = worker.play(job(prepared.plan, run))
             assert lasting(outcome) == quiet[run]

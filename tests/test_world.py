@@ -13,14 +13,14 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from cavsumo.bodies import KINDS, PEDESTRIAN, Body, Kind
 from cavsumo.egos import Acceleration
-from cavsumo.kinematics import wrap
-from cavsumo.options import OPTIONS
-from cavsumo.roads import Start
-from cavsumo.snapshot import BodyState, Snapshot
-from cavsumo.sumo_poses import from_sumo, to_sumo
-from cavsumo.world import World
+from cavsumo.model.bodies import KINDS, PEDESTRIAN, Body, Kind
+from cavsumo.model.carriageway import Start
+from cavsumo.model.kinematics import wrap
+from cavsumo.model.snapshot import BodyState, Snapshot
+from cavsumo.sumo.options import OPTIONS
+from cavsumo.sumo.poses import from_sumo, to_sumo
+from cavsumo.sumo.world import World
 
 Opener = Callable[..., World]
 EXACT = 1e-6  # m, rad

@@ -10,17 +10,17 @@ from typing import Any
 import libsumo
 import pytest
 
-from cavsumo.bodies import BICYCLE, BUS, CAR, PEDESTRIAN, Body, Kind
+from cavsumo.batch.jobs import job
+from cavsumo.batch.worker import Worker
 from cavsumo.egos import Acceleration, Drive
 from cavsumo.errors import SimulationError
-from cavsumo.jobs import job
-from cavsumo.kinematics import step_floats
-from cavsumo.roads import Start
-from cavsumo.snapshot import BodyState, Snapshot
-from cavsumo.starts import StartingArea
-from cavsumo.sumo_poses import to_sumo
-from cavsumo.worker import Worker
-from cavsumo.world import World
+from cavsumo.model.bodies import BICYCLE, BUS, CAR, PEDESTRIAN, Body, Kind
+from cavsumo.model.carriageway import Start
+from cavsumo.model.kinematics import step_floats
+from cavsumo.model.snapshot import BodyState, Snapshot
+from cavsumo.network.pedestrian_starts import StartingArea
+from cavsumo.sumo.poses import to_sumo
+from cavsumo.sumo.world import World
 
 Opener = Callable[..., World]
 LANE_Y = -1.825  # of the ego's lane on the straight road [m]
@@ -104,9 +104,9 @@ def test_shown_in_its_true_width_the_same_pedestrian_stops_the_ego(open_world: O
 
 def test_persons_on_a_real_junction_do_not_crash_sumo(set_up: Callable[..., Any]) -> None:
     """Episodes with testers shown as persons among marked crossings run to their end."""
-    setting = set_up("crossing", embodiment="person", agents=["programmed-random"], runs=3)
-    with Worker(setting) as worker:
-        rows = [worker.play(job(setting.plan, run))[0].row for run in setting.plan.todo()]
+    prepared = set_up("crossing", embodiment="person", agents=["programmed-random"], runs=3)
+    with Worker(prepared) as worker:
+        rows = [worker.play(job(prepared.plan, run))[0].row for run in prepared.plan.todo()]
     assert [row.get("error") for row in rows] == [None] * 3
     assert sum(row["steps"] for row in rows) > 150
 

@@ -7,10 +7,10 @@ from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 
-from cavsumo.bodies import NOOP, Action, Kind
-from cavsumo.registry import Registry
-from cavsumo.scene import Scene
-from cavsumo.snapshot import BodyState, Snapshot
+from cavsumo.model.bodies import NOOP, Action, Kind
+from cavsumo.model.registry import Registry
+from cavsumo.model.scene import Scene
+from cavsumo.model.snapshot import BodyState, Snapshot
 
 VERDICTS = SURE, UNDECIDED, NOT_FORCEABLE = "sure", "undecided", "not-forceable"
 

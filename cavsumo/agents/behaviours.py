@@ -10,9 +10,9 @@ from typing import Protocol
 from cavsumo.agents.manoeuvres import Driver
 from cavsumo.agents.triggers import Timing, Trigger
 from cavsumo.agents.walking import ApproachKerb, CrossingWalk, Stroll
-from cavsumo.bodies import NOOP, Action
-from cavsumo.scene import Scene
-from cavsumo.snapshot import BodyState, Snapshot
+from cavsumo.model.bodies import NOOP, Action
+from cavsumo.model.scene import Scene
+from cavsumo.model.snapshot import BodyState, Snapshot
 
 
 class Behaviour(Protocol):

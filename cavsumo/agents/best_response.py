@@ -1,7 +1,7 @@
 """A tester that learns how the ego drives, and plays the best response to it.
 
-It counts when the ego changes its acceleration and what it takes then (``abstraction.opponent``),
-solves the decision process that these counts make (``abstraction.solving``), and at every timestep
+It counts when the ego changes its acceleration and what it takes then (``planning.opponent``),
+solves the decision process that these counts make (``planning.solving``), and at every timestep
 does what is worth more from where things really are: to walk, or to stand. First it explores, with
 walks that are timed at random; then it plays, and solves anew every now and then.
 """
@@ -17,9 +17,15 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from cavsumo.abstraction.coordinates import Coordinates, Relative
-from cavsumo.abstraction.opponent import Counts, Watch, acceleration_class, situation
-from cavsumo.abstraction.response import (
+from cavsumo.agents.base import AGENTS, Agent, learner_of
+from cavsumo.agents.planning.coordinates import Coordinates, Relative
+from cavsumo.agents.planning.opponent import (
+    AccelerationReader,
+    Counts,
+    acceleration_class,
+    situation,
+)
+from cavsumo.agents.planning.response import (
     STAND,
     WALK,
     ZETAS,
@@ -30,14 +36,13 @@ from cavsumo.abstraction.response import (
     braking,
     scale,
 )
-from cavsumo.agents.base import AGENTS, Agent, learner_of
 from cavsumo.agents.triggers import Timing, time_to_walk
 from cavsumo.agents.walking import ApproachKerb, CrossingWalk, walk
-from cavsumo.bodies import NOOP, Action, Kind
-from cavsumo.checks import choice, number, truth
-from cavsumo.kinematics import wrap
-from cavsumo.scene import Scene
-from cavsumo.snapshot import BodyState, Snapshot
+from cavsumo.model.bodies import NOOP, Action, Kind
+from cavsumo.model.checks import choice, number, truth
+from cavsumo.model.kinematics import wrap
+from cavsumo.model.scene import Scene
+from cavsumo.model.snapshot import BodyState, Snapshot
 
 MODEL_DT = 0.1  # timestep of the model, unless those of the scenario are longer [s]
 AIMS = ("violation", "test")
@@ -52,7 +57,7 @@ KNOWN = "best-response"
 @lru_cache(maxsize=8)
 def _planned(counts: str, dt: float, aim: Aim) -> Plan:
     """The plan for counts as text; agents of one process share it."""
-    from cavsumo.abstraction.solving import best_response
+    from cavsumo.agents.planning.solving import best_response
 
     return best_response(Counts.of(json.loads(counts)), dt, aim)
 
@@ -125,7 +130,7 @@ class BestResponseAgent(Agent):
         self._every = max(1, round(MODEL_DT / scene.dt))
         dt = scene.dt * self._every
         self.plan = _planned(self.planned, dt, self.aim) if self.planned else None
-        self.watch = Watch(dt)
+        self.watch = AccelerationReader(dt)
         self.coordinates = [Coordinates(scene, i) for i in range(len(scene.bodies))]
         self._pupils = [Pupil(self, i) for i in self.owned]
         self._told: tuple[int, int, int] | None = None
@@ -141,7 +146,7 @@ class BestResponseAgent(Agent):
     def _look(self, snapshot: Snapshot) -> None:
         """See what the ego did, and count it in the situation in which it was."""
         if not snapshot.sees_ego:
-            self.watch, self._told = Watch(self.watch.dt), None
+            self.watch, self._told = AccelerationReader(self.watch.dt), None
             return
         watch, held = self.watch, self.watch.held
         watch.see(snapshot.ego.v)

@@ -19,9 +19,9 @@ import math
 from collections.abc import Iterable
 from functools import lru_cache
 
-from cavsumo.bodies import Action, Kind
-from cavsumo.paths import Path, Projection
-from cavsumo.snapshot import BodyState
+from cavsumo.model.bodies import Action, Kind
+from cavsumo.model.polyline import Path, Projection
+from cavsumo.model.snapshot import BodyState
 
 LATERAL_MPS2 = 2.5  # acceleration sideways that bounds the speed in bends
 GAINING_MPS2 = 2.5  # throttle of a calm driver

@@ -10,8 +10,8 @@ import numpy as np
 from cavsumo.agents.base import AGENTS, Agent
 from cavsumo.agents.programmed import IDLE_DOC, MANOEUVRE_DOC, ProgrammedAgent
 from cavsumo.agents.triggers import distance_ahead, ego_distance
-from cavsumo.checks import choice, number
-from cavsumo.snapshot import BodyState, Snapshot
+from cavsumo.model.checks import choice, number
+from cavsumo.model.snapshot import BodyState, Snapshot
 
 
 @AGENTS.register("election")

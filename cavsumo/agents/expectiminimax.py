@@ -11,19 +11,19 @@ from typing import ClassVar
 
 import numpy as np
 
-from cavsumo.abstraction.classes import EGO_CLASSES
-from cavsumo.abstraction.coordinates import Coordinates
-from cavsumo.abstraction.outlook import Constant, Free, Outlook, Unaware
-from cavsumo.abstraction.rules import Rules, against_any, against_constant
-from cavsumo.abstraction.solved import solved
 from cavsumo.agents.base import AGENTS, NOT_FORCEABLE, SURE, UNDECIDED, Agent, Forecast
-from cavsumo.agents.rehearsal import succeeds
-from cavsumo.agents.tactics import Tactic
+from cavsumo.agents.body_policy import BodyPolicy
+from cavsumo.agents.lookahead import succeeds
+from cavsumo.agents.planning.classes import EGO_CLASSES
+from cavsumo.agents.planning.coordinates import Coordinates
+from cavsumo.agents.planning.forceability import ConstantSpeed, Forceability, Free, Unaware
+from cavsumo.agents.planning.rules import Rules, against_any, against_constant
+from cavsumo.agents.planning.solved import solved
 from cavsumo.agents.triggers import MAX_DECEL, REACTION_TIME
-from cavsumo.bodies import PEDESTRIAN, Action, Kind
-from cavsumo.checks import choice, number
-from cavsumo.scene import Scene
-from cavsumo.snapshot import Snapshot
+from cavsumo.model.bodies import PEDESTRIAN, Action, Kind
+from cavsumo.model.checks import choice, number
+from cavsumo.model.scene import Scene
+from cavsumo.model.snapshot import Snapshot
 
 NEAR_M, FAR_M = 3.0, 6.0  # how far from the strip the tables begin: of free and of constant egos
 # Ways that are tried at once where the straight one takes too long, off the way across [rad].
@@ -72,37 +72,37 @@ class ExpectiminimaxAgent(Agent):
 
     def reset(self, scene: Scene, owned: Sequence[int], rng: np.random.Generator) -> None:
         super().reset(scene, owned, rng)
-        self._outlooks = {i: self._outlooks_of(i) for i in owned}
-        self.tactics = [Tactic(scene, i, self._outlooks[i]) for i in owned]
-        self.team = self.tactics
-        self.leader: Tactic | None = None
+        self._forceabilities = {i: self._forceabilities_of(i) for i in owned}
+        self.policies = [BodyPolicy(scene, i, self._forceabilities[i]) for i in owned]
+        self.team = self.policies
+        self.leader: BodyPolicy | None = None
 
     def forecast(self, snapshot: Snapshot) -> Forecast:
         where = {i: Coordinates(self.scene, i)(snapshot) for i in self.owned}
-        outlooks = {i: self._outlooks[i][0] for i in self.owned}
-        worth = [outlooks[i].worth(here) for i, here in where.items() if here is not None]
+        forceabilities = {i: self._forceabilities[i][0] for i in self.owned}
+        worth = [forceabilities[i].worth(here) for i, here in where.items() if here is not None]
         best = max(worth, default=-1.0)
         if self.against == "constant":
-            return Forecast(self._rehearsed(snapshot), best)
-        if any(here is not None and outlooks[i].sure(here) for i, here in where.items()):
+            return Forecast(self._simulated_ahead(snapshot), best)
+        if any(here is not None and forceabilities[i].sure(here) for i, here in where.items()):
             return Forecast(SURE, best)
-        if any(here is not None and outlooks[i].possible(here) for i, here in where.items()):
+        if any(here is not None and forceabilities[i].possible(here) for i, here in where.items()):
             return Forecast(UNDECIDED, best)
         return Forecast(NOT_FORCEABLE, best)
 
     def choose_action(self, snapshot: Snapshot) -> tuple[Action, ...]:
-        chosen = [None if t.going else t.idle(snapshot) for t in self.tactics]
+        chosen = [None if t.going else t.idle(snapshot) for t in self.policies]
         if snapshot.sees_ego:
             self._send(snapshot, chosen)
         return tuple(
             t.go(snapshot) if t.going or idle is None else idle
-            for t, idle in zip(self.tactics, chosen, strict=True)
+            for t, idle in zip(self.policies, chosen, strict=True)
         )
 
     @classmethod
     def coordinate(cls, agents: Sequence[Agent], rng: np.random.Generator) -> None:
         mine = [agent for agent in agents if isinstance(agent, ExpectiminimaxAgent)]
-        team = [tactic for agent in mine for tactic in agent.tactics]
+        team = [policy for agent in mine for policy in agent.policies]
         for agent in mine:
             agent.team = team
 
@@ -116,18 +116,18 @@ class ExpectiminimaxAgent(Agent):
         if self.leader is not None and self.leader.lost(snapshot):
             self.leader = None
         gain, n = 0.0, 0
-        for i, (tactic, action) in enumerate(zip(self.tactics, idle, strict=True)):
-            if action is not None and self.leader in (None, tactic):
-                gain, n = max((gain, n), (tactic.due(snapshot, action), -i))
+        for i, (policy, action) in enumerate(zip(self.policies, idle, strict=True)):
+            if action is not None and self.leader in (None, policy):
+                gain, n = max((gain, n), (policy.due(snapshot, action), -i))
         if gain >= 1.0 or (gain > 0.0 and not any(t.sure(snapshot) for t in self.team)):
-            self.tactics[-n].going = True
+            self.policies[-n].going = True
 
-    def _rehearsed(self, snapshot: Snapshot) -> str:
+    def _simulated_ahead(self, snapshot: Snapshot) -> str:
         """The verdict of episodes played in the head; the way that succeeds is the one taken."""
         scene = self.scene
         for n, i in enumerate(self.owned):
             for turn in (None, *self._escapes(snapshot, i)):
-                if succeeds(scene, snapshot, Tactic(scene, i, self._outlooks[i], turn)):
+                if succeeds(scene, snapshot, BodyPolicy(scene, i, self._forceabilities[i], turn)):
                     self._lead(n, turn)
                     return SURE
         return NOT_FORCEABLE
@@ -139,21 +139,24 @@ class ExpectiminimaxAgent(Agent):
         On a way at phi to the straight one a body at speed w gains d tan(phi) of the ego's way and
         loses d (1 / cos(phi) - 1) / w of its time: at best d / w (1 - sqrt(1 - (w / v)^2)).
         """
-        outlook, here = self._outlooks[index][-1], Coordinates(self.scene, index)(snapshot)
+        forceability, here = (
+            self._forceabilities[index][-1],
+            Coordinates(self.scene, index)(snapshot),
+        )
         if here is None or here.left <= 0.0 or here.gap <= 0.0:
             return ()
-        w, v = outlook.kind.v_max, here.v
+        w, v = forceability.kind.v_max, here.v
         if v > w:
             gain = here.left / w * (1.0 - math.sqrt(1.0 - (w / v) ** 2))
-            t, _, _ = outlook.walked(here, 0.0)
-            late = t - here.gap / v + 0.5 * v / outlook.max_decel
+            t, _, _ = forceability.walked(here, 0.0)
+            late = t - here.gap / v + 0.5 * v / forceability.max_decel
             if late > gain + TURNING_S:
                 return ()
         return ESCAPES
 
     def _lead(self, n: int, escape: float | None) -> None:
         """Let one body play alone as long as it can come to a test."""
-        self.leader = self.tactics[n]
+        self.leader = self.policies[n]
         self.leader.escape, self.leader.going = escape, escape is not None
 
     def _rules(self) -> list[Rules]:
@@ -172,11 +175,11 @@ class ExpectiminimaxAgent(Agent):
         )
         return [free, constant]
 
-    def _outlooks_of(self, index: int) -> tuple[Outlook, ...]:
+    def _forceabilities_of(self, index: int) -> tuple[Forceability, ...]:
         """How one body judges its chances."""
         scene, tables = self.scene, [solved(rules) for rules in self._rules()]
         kind = scene.bodies[index].kind
-        found: list[Outlook] = [Constant(kind, tables[-1], MAX_DECEL, scene.dt)]
+        found: list[Forceability] = [ConstantSpeed(kind, tables[-1], MAX_DECEL, scene.dt)]
         met = Coordinates(scene, index).meeting
         if self.against == "any":
             found.insert(0, Free(kind, tables[0], MAX_DECEL, scene.dt))

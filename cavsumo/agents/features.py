@@ -9,10 +9,10 @@ import math
 
 from cavsumo.agents.triggers import MAX_DECEL, REACTION_TIME, time_to_walk
 from cavsumo.agents.walking import walk
-from cavsumo.bodies import Action
-from cavsumo.geometry import stopping_distances
-from cavsumo.scene import Scene
-from cavsumo.snapshot import BodyState, Snapshot
+from cavsumo.model.bodies import Action
+from cavsumo.model.scene import Scene
+from cavsumo.model.snapshot import BodyState, Snapshot
+from cavsumo.model.stopping_zones import stopping_distances
 
 # Targets of a decision: whether to move, and the heading relative to the way across the road.
 TARGETS: tuple[tuple[bool, float], ...] = (

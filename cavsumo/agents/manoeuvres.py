@@ -13,11 +13,11 @@ from typing import ClassVar
 
 from cavsumo.agents.driving import HASTE_MPS2, RUN_OUT_M, Course, stopping_from
 from cavsumo.agents.triggers import MARGIN, MAX_DECEL, REACTION_TIME, Trigger
-from cavsumo.bodies import NOOP, Action
-from cavsumo.fairness import drift
-from cavsumo.roads import Approach
-from cavsumo.scene import Scene
-from cavsumo.snapshot import BodyState, Snapshot
+from cavsumo.model.bodies import NOOP, Action
+from cavsumo.model.carriageway import Approach
+from cavsumo.model.scene import Scene
+from cavsumo.model.snapshot import BodyState, Snapshot
+from cavsumo.model.zone_presence import drift
 
 MANOEUVRES = ("auto", "run", "brake", "cut-in")
 CREEPING_MPS = 2.0  # a lawful vehicle goes no slower than this to where it waits
@@ -33,7 +33,7 @@ MOVING_OFF = 0.7  # an ego slower than this share of its speed limit that gains 
 FAR_M = 30.0  # a run that leads into the ego's lane has ended after this
 
 
-class Forecast:
+class EgoPrediction:
     """Where the ego will be: at the speed that it has, or gaining speed while it moves off."""
 
     def __init__(self, scene: Scene, limit: float) -> None:
@@ -84,11 +84,11 @@ class Manoeuvre:
         """Whether it has ended, and the vehicle drives lawfully on."""
         return False
 
-    def gap(self, ego: Forecast, state: BodyState) -> tuple[float, float] | None:
+    def gap(self, ego: EgoPrediction, state: BodyState) -> tuple[float, float] | None:
         """Room that an ego which drives on has left on meeting a vehicle that begins now [m].
 
         With it the ego's speed then [m/s]. Measured as the stopping zones count vehicles
-        (``fairness``). None when they will not meet.
+        (``zone_presence``). None when they will not meet.
         """
         raise NotImplementedError
 
@@ -109,7 +109,7 @@ class Run(Manoeuvre):
         end = min(self.approach.leave, self.approach.enter + FAR_M)
         return self.course.place(state)[0] > end
 
-    def gap(self, ego: Forecast, state: BodyState) -> tuple[float, float] | None:
+    def gap(self, ego: EgoPrediction, state: BodyState) -> tuple[float, float] | None:
         if not self.possible(state):
             return None
         approach, path = self.approach, self.scene.ego_path
@@ -133,7 +133,7 @@ class Brake(Manoeuvre):
     def over(self, state: BodyState) -> bool:
         return self.standing > STANDS_S
 
-    def gap(self, ego: Forecast, state: BodyState) -> tuple[float, float] | None:
+    def gap(self, ego: EgoPrediction, state: BodyState) -> tuple[float, float] | None:
         rear = self.course.place(state)[0] - state.body.kind.length / 2
         front, ego_v = ego.after(NOTICE_S)
         return rear + drift(state.v, ego_v, MAX_DECEL) - front - STANDING_M, ego_v
@@ -162,7 +162,7 @@ class CutIn(Manoeuvre):
         end = self.course.path.length - STOPPING_M
         return self.arrived and self.course.place(state)[0] > end
 
-    def gap(self, ego: Forecast, state: BodyState) -> tuple[float, float] | None:
+    def gap(self, ego: EgoPrediction, state: BodyState) -> tuple[float, float] | None:
         here = self.scene.ego_path.project(state.x, state.y)
         kind = state.body.kind
         if state.v <= 0.0 or not 0.0 < here.along < self.scene.ego_path.length:
@@ -269,7 +269,7 @@ class Arrival:
 
     def __init__(self, driver: Driver, aim: float) -> None:
         self.driver, self.aim = driver, aim
-        self.ego = Forecast(driver.scene, driver.approach.ego_speed)
+        self.ego = EgoPrediction(driver.scene, driver.approach.ego_speed)
 
     def __call__(self, snapshot: Snapshot, state: BodyState) -> bool:
         if self.driver.manoeuvre is None:

@@ -1,4 +1,4 @@
-"""Testers that a user trained: ``policy:FILE``, the format is that of ``policies``.
+"""Testers that a user trained: ``policy:FILE``, the format is that of ``policy_file``.
 
 Such a tester goes wherever the name of a registered one does.
 """
@@ -13,13 +13,13 @@ import numpy as np
 
 from cavsumo.agents.base import AGENTS, Agent
 from cavsumo.agents.features import across, towards
-from cavsumo.bodies import WALKING, Action, Kind
+from cavsumo.agents.observations import TeamObserver
+from cavsumo.agents.policy_file import TrainedPolicy, read_policy
 from cavsumo.errors import InputError, UnknownName
-from cavsumo.observations import Observer
-from cavsumo.policies import Policy, read_policy
-from cavsumo.registry import Parameter
-from cavsumo.scene import Scene
-from cavsumo.snapshot import Snapshot
+from cavsumo.model.bodies import WALKING, Action, Kind
+from cavsumo.model.registry import Parameter
+from cavsumo.model.scene import Scene
+from cavsumo.model.snapshot import Snapshot
 
 PREFIX = "policy:"
 
@@ -53,7 +53,7 @@ class PolicyAgent(Agent):
 
     sees_background = False
 
-    def __init__(self, policy: Policy) -> None:
+    def __init__(self, policy: TrainedPolicy) -> None:
         self.policy = policy
         self.drives = policy.header.kind not in WALKING
 
@@ -67,7 +67,7 @@ class PolicyAgent(Agent):
 
     def reset(self, scene: Scene, owned: Sequence[int], rng: np.random.Generator) -> None:
         super().reset(scene, owned, rng)
-        self._observer = Observer(scene, owned)
+        self._observer = TeamObserver(scene, owned)
         self._ways = [across(scene, i) for i in owned]
         self._left = 0  # timesteps that the decision still holds
 

@@ -17,10 +17,10 @@ from cavsumo.agents.behaviours import behaviour
 from cavsumo.agents.manoeuvres import MANOEUVRES
 from cavsumo.agents.random import EPSILON_DOC, RATE_DOC, Exploration
 from cavsumo.agents.triggers import Proximity, Trigger
-from cavsumo.bodies import Action
-from cavsumo.checks import choice, number
-from cavsumo.scene import Scene
-from cavsumo.snapshot import BodyState, Snapshot
+from cavsumo.model.bodies import Action
+from cavsumo.model.checks import choice, number
+from cavsumo.model.scene import Scene
+from cavsumo.model.snapshot import BodyState, Snapshot
 
 IDLE_DOC = (
     "before crossing: walk along the 'pavement', wait at the 'kerb', or 'noop'; vehicles drive "

@@ -21,10 +21,10 @@ import numpy as np
 
 from cavsumo.agents.base import AGENTS, Agent, learner_of
 from cavsumo.agents.features import FEATURES, TARGETS, Features, towards
-from cavsumo.bodies import Action
-from cavsumo.checks import number, truth
-from cavsumo.scene import Scene
-from cavsumo.snapshot import Snapshot
+from cavsumo.model.bodies import Action
+from cavsumo.model.checks import number, truth
+from cavsumo.model.scene import Scene
+from cavsumo.model.snapshot import Snapshot
 
 
 @AGENTS.register("q-learning")

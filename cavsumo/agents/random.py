@@ -9,10 +9,10 @@ from typing import ClassVar
 import numpy as np
 
 from cavsumo.agents.base import AGENTS, Agent
-from cavsumo.bodies import NOOP, Action, Kind
-from cavsumo.checks import choice, number
-from cavsumo.scene import Scene
-from cavsumo.snapshot import Snapshot
+from cavsumo.model.bodies import NOOP, Action, Kind
+from cavsumo.model.checks import choice, number
+from cavsumo.model.scene import Scene
+from cavsumo.model.snapshot import Snapshot
 
 RATE_DOC = "exploration rate [1/s]; epsilon = 1 - exp(-rate_per_s * timestep)"
 EPSILON_DOC = "exploration rate per timestep [0..1], as in the seed; replaces rate_per_s"

@@ -8,11 +8,11 @@ from typing import Any
 import numpy as np
 
 from cavsumo.agents.base import AGENTS, Agent
-from cavsumo.bodies import NOOP, Action, Kind
 from cavsumo.errors import NoSuchAction
-from cavsumo.kinematics import steering_for_turn, wrap
-from cavsumo.scene import Scene
-from cavsumo.snapshot import Snapshot
+from cavsumo.model.bodies import NOOP, Action, Kind
+from cavsumo.model.kinematics import steering_for_turn, wrap
+from cavsumo.model.scene import Scene
+from cavsumo.model.snapshot import Snapshot
 
 Joint = Sequence[tuple[float, float]]  # throttle and steering of each owned body
 

@@ -5,11 +5,11 @@ from __future__ import annotations
 import math
 from typing import Protocol
 
-from cavsumo.abstraction.coordinates import meeting
-from cavsumo.bodies import Kind, detour
-from cavsumo.roads import Crossing
-from cavsumo.scene import Scene
-from cavsumo.snapshot import BodyState, Snapshot
+from cavsumo.agents.planning.coordinates import meeting
+from cavsumo.model.bodies import Kind, detour
+from cavsumo.model.carriageway import Crossing
+from cavsumo.model.scene import Scene
+from cavsumo.model.snapshot import BodyState, Snapshot
 
 # The zones that the timing trigger aims at: CAV-Gym's, as in the reaction-zone assertion.
 MAX_DECEL, REACTION_TIME = 9.0, 0.675  # m/s2, s

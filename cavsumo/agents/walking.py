@@ -7,11 +7,11 @@ from __future__ import annotations
 
 import math
 
-from cavsumo.bodies import Action, Kind, turn_radius
-from cavsumo.kinematics import steering_for_turn, wrap
-from cavsumo.roads import Crossing
-from cavsumo.scene import Scene
-from cavsumo.snapshot import BodyState
+from cavsumo.model.bodies import Action, Kind, turn_radius
+from cavsumo.model.carriageway import Crossing
+from cavsumo.model.kinematics import steering_for_turn, wrap
+from cavsumo.model.scene import Scene
+from cavsumo.model.snapshot import BodyState
 
 ALIGNED_RAD = 1e-6  # a heading this close to its target has reached it
 KERB_CLEARANCE_M = 0.1  # distance kept to the carriageway while waiting at the kerb

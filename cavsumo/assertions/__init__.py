@@ -1,6 +1,9 @@
-"""What the ego must not do: one protocol (``base``), one registry, one file an assertion.
+"""What the ego must not do: the protocol (``base``), the registry, one file an assertion.
 
-Importing this package registers the assertions that come with cavsumo.
+Also what an episode is judged by besides: contacts, validity of the testers, blame, naturalness,
+criticality, ``metrics`` (functions of numbers), ``formulas`` (temporal logic).
+Importing this package registers the assertions that come with cavsumo. Nothing here moves a body.
+To add one: a file here, its name in the import below.
 """
 
 from cavsumo.assertions import (  # noqa: F401  (imported to be registered)

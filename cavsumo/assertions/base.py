@@ -7,10 +7,10 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import ClassVar
 
-from cavsumo.contacts import Contact
-from cavsumo.registry import Registry
-from cavsumo.scene import Scene
-from cavsumo.snapshot import Snapshot
+from cavsumo.assertions.contacts import Contact
+from cavsumo.model.registry import Registry
+from cavsumo.model.scene import Scene
+from cavsumo.model.snapshot import Snapshot
 
 # Verdicts, the most serious first: how several assertions make one outcome.
 VIOLATED, UNFAIR, HELD, NOT_TRIGGERED = "violated", "unfair", "held", "not_triggered"

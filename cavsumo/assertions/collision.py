@@ -7,10 +7,10 @@ from dataclasses import replace
 from typing import ClassVar
 
 from cavsumo.assertions.base import ASSERTIONS, HELD, VIOLATED, Assertion, Judgement
-from cavsumo.assertions.room import Room, impact
-from cavsumo.contacts import STANDING_MPS, Contact
-from cavsumo.scene import Scene
-from cavsumo.snapshot import Snapshot
+from cavsumo.assertions.clearance import Room, impact
+from cavsumo.assertions.contacts import STANDING_MPS, Contact
+from cavsumo.model.scene import Scene
+from cavsumo.model.snapshot import Snapshot
 
 
 @ASSERTIONS.register("collision")

@@ -16,13 +16,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cavsumo.assertions.base import ASSERTIONS
+from cavsumo.assertions.contacts import STANDING_MPS
 from cavsumo.assertions.margin import Margin, MarginAssertion
-from cavsumo.checks import number
-from cavsumo.contacts import STANDING_MPS
-from cavsumo.geometry import Box, overlap
-from cavsumo.metrics.plane import drac_boxes, ttc_boxes
-from cavsumo.scene import Scene
-from cavsumo.snapshot import BodyState, Snapshot
+from cavsumo.assertions.metrics.plane import drac_boxes, ttc_boxes
+from cavsumo.model.checks import number
+from cavsumo.model.geometry import Box, overlap
+from cavsumo.model.scene import Scene
+from cavsumo.model.snapshot import BodyState, Snapshot
 
 Metric = Callable[..., NDArray[np.float64]]
 COURSE_S = 10.0  # who would meet the ego later than this is on no course of collision

@@ -21,11 +21,11 @@ from numbers import Real
 from typing import Any
 
 from cavsumo.assertions.base import HELD, SEVERITY, VIOLATED, Assertion, Judgement
-from cavsumo.contacts import Contact
+from cavsumo.assertions.contacts import Contact
 from cavsumo.errors import AssertionFault, InputError
-from cavsumo.imports import imported, said
-from cavsumo.scene import Scene
-from cavsumo.snapshot import Snapshot
+from cavsumo.model.plugins import imported, said
+from cavsumo.model.scene import Scene
+from cavsumo.model.snapshot import Snapshot
 
 SCENE = "scene"  # name of the second parameter of a function that is given the scene
 

@@ -16,13 +16,13 @@ from functools import partial
 import numpy as np
 
 from cavsumo.assertions.base import HELD, VIOLATED, Assertion, Judgement
-from cavsumo.contacts import Contact
+from cavsumo.assertions.contacts import Contact
+from cavsumo.assertions.formulas import SIGNALS, Moment, NoNumber, Rule, View, robustness
+from cavsumo.assertions.formulas.nodes import TruthNode
+from cavsumo.assertions.formulas.semantics import Bounds
 from cavsumo.errors import AssertionFault
-from cavsumo.formulas import SIGNALS, Moment, NoNumber, Rule, View, robustness
-from cavsumo.formulas.nodes import TruthNode
-from cavsumo.formulas.semantics import Bounds
-from cavsumo.scene import Scene
-from cavsumo.snapshot import Snapshot
+from cavsumo.model.scene import Scene
+from cavsumo.model.snapshot import Snapshot
 
 CHECK_S = 1.0  # how often a formula is judged that a single timestep cannot decide
 

@@ -11,14 +11,14 @@ from shapely.geometry import Point, Polygon
 
 from cavsumo.assertions.base import ASSERTIONS
 from cavsumo.assertions.margin import Margin, MarginAssertion
+from cavsumo.assertions.metrics.highway_code import DECEL, THINKING_S
 from cavsumo.assertions.relations import everybody, front_along
-from cavsumo.bodies import WALKING
-from cavsumo.checks import number, truth
-from cavsumo.geometry import corners
-from cavsumo.metrics.highway_code import DECEL, THINKING_S
-from cavsumo.roads import MarkedCrossing
-from cavsumo.scene import Scene
-from cavsumo.snapshot import BodyState, Snapshot
+from cavsumo.model.bodies import WALKING
+from cavsumo.model.carriageway import MarkedCrossing
+from cavsumo.model.checks import number, truth
+from cavsumo.model.geometry import corners
+from cavsumo.model.scene import Scene
+from cavsumo.model.snapshot import BodyState, Snapshot
 
 AHEAD_M = 60.0  # a crossing is looked at from this far before it
 CLEAR_M = 0.5  # who is this far beside the ego's strip and walks away from it has crossed

@@ -7,10 +7,10 @@ from typing import ClassVar
 
 from cavsumo.assertions.base import ASSERTIONS
 from cavsumo.assertions.margin import Margin, MarginAssertion, acceleration
+from cavsumo.assertions.metrics.highway_code import DECEL, THINKING_S
 from cavsumo.assertions.reasons import has_reason
-from cavsumo.checks import number, truth
-from cavsumo.metrics.highway_code import DECEL, THINKING_S
-from cavsumo.snapshot import Snapshot
+from cavsumo.model.checks import number, truth
+from cavsumo.model.snapshot import Snapshot
 
 ROOM_M = 5.0  # what is this far beyond the stopping distance is still a reason to brake
 

@@ -7,9 +7,9 @@ from typing import ClassVar
 
 from cavsumo.assertions.base import ASSERTIONS
 from cavsumo.assertions.margin import Margin, MarginAssertion
-from cavsumo.checks import number
-from cavsumo.geometry import corners
-from cavsumo.snapshot import Snapshot
+from cavsumo.model.checks import number
+from cavsumo.model.geometry import corners
+from cavsumo.model.snapshot import Snapshot
 
 END_M = 5.0  # a road's end is no kerb: corners nearer to the ends of the path are not looked at
 

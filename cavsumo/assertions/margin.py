@@ -19,9 +19,9 @@ from cavsumo.assertions.base import (
     Assertion,
     Judgement,
 )
-from cavsumo.contacts import Contact
-from cavsumo.scene import Scene
-from cavsumo.snapshot import Snapshot
+from cavsumo.assertions.contacts import Contact
+from cavsumo.model.scene import Scene
+from cavsumo.model.snapshot import Snapshot
 
 Margin = tuple[str, float]  # the body involved (empty for none) and the margin in ``unit``
 

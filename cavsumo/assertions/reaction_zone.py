@@ -7,10 +7,10 @@ The precondition is that a tester's body enters the ego's reaction zone before i
 braking zone or the ego: late enough to be hard, early enough for a vehicle that brakes at once.
 A body that touches the braking zone or the ego first makes the episode unfair.
 
-Vehicles among the testers count by where they will be and only in the ego's way (``fairness``): one
-that is followed at an ordinary distance is in no zone until it brakes, one beside in its own lane
-never. A vehicle that drives into the ego's side or rear after the trigger makes the episode
-unfair: no ego could have done anything about it.
+Vehicles among the testers count by where they will be and only in the ego's way
+(``zone_presence``): one that is followed at an ordinary distance is in no zone until it brakes, one
+beside in its own lane never. A vehicle that drives into the ego's side or rear after the trigger
+makes the episode unfair: no ego could have done anything about it.
 """
 
 from __future__ import annotations
@@ -28,14 +28,15 @@ from cavsumo.assertions.base import (
     Assertion,
     Judgement,
 )
-from cavsumo.assertions.room import Room, impact
-from cavsumo.bodies import WALKING
-from cavsumo.checks import number
-from cavsumo.contacts import STANDING_MPS, Contact
-from cavsumo.fairness import counted, drives_clear, is_vehicle, out_of_the_way, ran_into
-from cavsumo.geometry import TOUCH, Box, in_frame, overlap, zone_entered
-from cavsumo.scene import Scene
-from cavsumo.snapshot import BodyState, Snapshot
+from cavsumo.assertions.clearance import Room, impact
+from cavsumo.assertions.contacts import STANDING_MPS, Contact
+from cavsumo.model.bodies import WALKING
+from cavsumo.model.checks import number
+from cavsumo.model.geometry import TOUCH, Box, in_frame, overlap
+from cavsumo.model.scene import Scene
+from cavsumo.model.snapshot import BodyState, Snapshot
+from cavsumo.model.stopping_zones import zone_entered
+from cavsumo.model.zone_presence import counted, drives_clear, is_vehicle, out_of_the_way, ran_into
 
 BESIDE_M = 0.2  # a body this far beside the strip ahead has left the ego's way
 

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import math
 
+from cavsumo.assertions.contacts import STANDING_MPS
 from cavsumo.assertions.red_light import AMBER, RED
 from cavsumo.assertions.relations import Relation, front_along, relations
-from cavsumo.contacts import STANDING_MPS
-from cavsumo.fairness import is_vehicle
-from cavsumo.scene import Scene
-from cavsumo.snapshot import Snapshot
+from cavsumo.model.scene import Scene
+from cavsumo.model.snapshot import Snapshot
+from cavsumo.model.zone_presence import is_vehicle
 
 BESIDE_M = 1.0  # who stands this near the ego's strip may be about to enter it
 

@@ -7,11 +7,11 @@ from typing import ClassVar
 
 from cavsumo.assertions.base import ASSERTIONS
 from cavsumo.assertions.margin import Margin, MarginAssertion
+from cavsumo.assertions.metrics.highway_code import DECEL, THINKING_S
 from cavsumo.assertions.relations import front_along
-from cavsumo.checks import number, truth
-from cavsumo.metrics.highway_code import DECEL, THINKING_S
-from cavsumo.scene import Scene
-from cavsumo.snapshot import Snapshot
+from cavsumo.model.checks import number, truth
+from cavsumo.model.scene import Scene
+from cavsumo.model.snapshot import Snapshot
 
 RED, AMBER = "ru", "yY"  # SUMO's letters; u is red and amber, which still means stop
 

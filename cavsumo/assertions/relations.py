@@ -10,10 +10,10 @@ import math
 from collections.abc import Iterator
 from typing import NamedTuple
 
-from cavsumo.geometry import corners
-from cavsumo.paths import Path
-from cavsumo.scene import Scene
-from cavsumo.snapshot import BodyState, Snapshot
+from cavsumo.model.geometry import corners
+from cavsumo.model.polyline import Path
+from cavsumo.model.scene import Scene
+from cavsumo.model.snapshot import BodyState, Snapshot
 
 
 class Relation(NamedTuple):

@@ -11,13 +11,13 @@ from dataclasses import dataclass
 from typing import ClassVar, Literal
 
 from cavsumo.assertions.base import ASSERTIONS
+from cavsumo.assertions.contacts import STANDING_MPS
 from cavsumo.assertions.margin import Margin, MarginAssertion, acceleration
+from cavsumo.assertions.metrics.rss import rss_lateral, rss_longitudinal, rss_longitudinal_opposite
 from cavsumo.assertions.relations import Relation, relations
-from cavsumo.checks import number
-from cavsumo.contacts import STANDING_MPS
-from cavsumo.metrics.rss import rss_lateral, rss_longitudinal, rss_longitudinal_opposite
-from cavsumo.scene import Scene
-from cavsumo.snapshot import Snapshot
+from cavsumo.model.checks import number
+from cavsumo.model.scene import Scene
+from cavsumo.model.snapshot import Snapshot
 
 RANGE_M = 150.0  # nobody farther away is looked at
 SLACK = 0.05  # m/s2 that rounding may cost

@@ -10,10 +10,10 @@ from typing import Any
 from cavsumo.assertions.base import ASSERTIONS, Assertion
 from cavsumo.assertions.custom import CustomAssertion, custom_parameters
 from cavsumo.assertions.formula import FormulaAssertion
+from cavsumo.assertions.formulas import Rule, rule
 from cavsumo.errors import InputError
-from cavsumo.formulas import Rule, rule
-from cavsumo.imports import imported, source_file
-from cavsumo.registry import Registry
+from cavsumo.model.plugins import imported, source_file
+from cavsumo.model.registry import Registry
 
 # What an assertion may be called besides a registered name, for listings.
 FORMS: Mapping[str, str] = {

@@ -7,10 +7,10 @@ from typing import ClassVar
 
 from cavsumo.assertions.base import ASSERTIONS
 from cavsumo.assertions.margin import Margin, MarginAssertion
-from cavsumo.checks import number
-from cavsumo.metrics.highway_code import MPH
-from cavsumo.scene import Scene
-from cavsumo.snapshot import Snapshot
+from cavsumo.assertions.metrics.highway_code import MPH
+from cavsumo.model.checks import number
+from cavsumo.model.scene import Scene
+from cavsumo.model.snapshot import Snapshot
 
 
 @ASSERTIONS.register("speed-limit")

@@ -9,12 +9,12 @@ from collections.abc import Iterator, Mapping, Sequence
 from typing import ClassVar
 
 from cavsumo.assertions.base import ASSERTIONS, VIOLATED
+from cavsumo.assertions.contacts import STANDING_MPS, Contact
 from cavsumo.assertions.margin import Margin, MarginAssertion
 from cavsumo.assertions.reasons import has_reason
-from cavsumo.checks import number
-from cavsumo.contacts import STANDING_MPS, Contact
-from cavsumo.scene import Scene
-from cavsumo.snapshot import Snapshot
+from cavsumo.model.checks import number
+from cavsumo.model.scene import Scene
+from cavsumo.model.snapshot import Snapshot
 
 
 @ASSERTIONS.register("standing")

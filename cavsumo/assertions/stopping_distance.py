@@ -6,12 +6,12 @@ from collections.abc import Iterator, Mapping
 from typing import ClassVar
 
 from cavsumo.assertions.base import ASSERTIONS
+from cavsumo.assertions.contacts import STANDING_MPS
 from cavsumo.assertions.margin import Margin, MarginAssertion, acceleration
+from cavsumo.assertions.metrics.highway_code import DECEL, THINKING_S, WET
 from cavsumo.assertions.relations import in_way
-from cavsumo.checks import number, truth
-from cavsumo.contacts import STANDING_MPS
-from cavsumo.metrics.highway_code import DECEL, THINKING_S, WET
-from cavsumo.snapshot import Snapshot
+from cavsumo.model.checks import number, truth
+from cavsumo.model.snapshot import Snapshot
 
 NEARBY = 2.0  # stopping distances within which somebody counts as ahead
 

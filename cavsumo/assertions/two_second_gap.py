@@ -7,11 +7,11 @@ from typing import ClassVar
 
 from cavsumo.assertions.base import ASSERTIONS
 from cavsumo.assertions.margin import Margin, MarginAssertion
+from cavsumo.assertions.metrics.highway_code import MPH, WET
 from cavsumo.assertions.relations import in_way
-from cavsumo.checks import number, truth
-from cavsumo.fairness import is_vehicle
-from cavsumo.metrics.highway_code import MPH, WET
-from cavsumo.snapshot import Snapshot
+from cavsumo.model.checks import number, truth
+from cavsumo.model.snapshot import Snapshot
+from cavsumo.model.zone_presence import is_vehicle
 
 ALONG = 0.7  # share of a vehicle's speed that is along the path when it drives the ego's way
 

@@ -1,9 +1,15 @@
-"""The vehicle under test: one protocol (``base``), one registry, one file a sort.
+"""The vehicle under test: the protocol (``base``), the registry, one file a sort of driver.
 
-Importing this package registers the egos that come with cavsumo.
+``external`` speaks with egos in other processes, ``reference`` holds the drivers by which
+violations are judged. Importing this package registers the egos that come with cavsumo.
+To add one: a file here, its name in the import below. To add a reference driver: ``reference``.
 """
 
-from cavsumo.egos import constant, sumo, time_gap  # noqa: F401  (imported to be registered)
+from cavsumo.egos import (  # noqa: F401  (imported to be registered)
+    constant,
+    sumo,
+    time_gap,
+)
 from cavsumo.egos.base import EGOS, Acceleration, Command, Drive, Ego
 from cavsumo.egos.specs import make_ego
 

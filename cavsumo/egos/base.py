@@ -7,12 +7,12 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import ClassVar, NamedTuple
 
-from cavsumo.bodies import CAR, Kind
-from cavsumo.paths import Path as Polyline
-from cavsumo.registry import Registry
-from cavsumo.roads import Light
-from cavsumo.scene import Scene
-from cavsumo.snapshot import Snapshot
+from cavsumo.model.bodies import CAR, Kind
+from cavsumo.model.carriageway import Light
+from cavsumo.model.polyline import Path as Polyline
+from cavsumo.model.registry import Registry
+from cavsumo.model.scene import Scene
+from cavsumo.model.snapshot import Snapshot
 
 # CAV-Gym's car on roads that allow more than its 9 m/s.
 EGO_KIND = dataclasses.replace(CAR, v_max=55.0)

@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import ClassVar
 
-from cavsumo.checks import number
 from cavsumo.egos.base import EGOS, Acceleration, Command, Ego
-from cavsumo.scene import Scene
-from cavsumo.snapshot import Snapshot
+from cavsumo.model.checks import number
+from cavsumo.model.scene import Scene
+from cavsumo.model.snapshot import Snapshot
 
 
 @EGOS.register("constant")

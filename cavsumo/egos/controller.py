@@ -9,13 +9,13 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from typing import Any
 
-from cavsumo.bodies import Kind
 from cavsumo.egos.base import EGO_KIND, Command, Ego
 from cavsumo.egos.effectors import checked, within
 from cavsumo.errors import EgoError, InputError
-from cavsumo.imports import imported, said
-from cavsumo.scene import Scene
-from cavsumo.snapshot import Snapshot
+from cavsumo.model.bodies import Kind
+from cavsumo.model.plugins import imported, said
+from cavsumo.model.scene import Scene
+from cavsumo.model.snapshot import Snapshot
 
 
 class ControllerEgo(Ego):
@@ -31,7 +31,9 @@ class ControllerEgo(Ego):
             raise InputError(f"ego {spec}: has no method act(snapshot)")
         self.kind = getattr(self.controller, "kind", EGO_KIND)
         if not isinstance(self.kind, Kind):
-            raise InputError(f"ego {spec}: kind must be a cavsumo.bodies.Kind, got {self.kind!r}")
+            raise InputError(
+                f"ego {spec}: kind must be a cavsumo.model.bodies.Kind, got {self.kind!r}"
+            )
         speed = getattr(self.controller, "depart_speed", None)
         if speed is not None and not within(speed, 0.0, self.kind.v_max):
             raise InputError(f"ego {spec}: depart_speed must lie in [0, {self.kind.v_max:g}] m/s")

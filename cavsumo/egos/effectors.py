@@ -6,9 +6,9 @@ import math
 from collections.abc import Sequence
 from typing import Any
 
-from cavsumo.bodies import Kind
 from cavsumo.egos.base import Acceleration, Command, Drive
 from cavsumo.errors import EgoError
+from cavsumo.model.bodies import Kind
 
 
 def checked(

@@ -9,9 +9,9 @@ from typing import Any
 
 from cavsumo.egos.base import EGOS, Ego
 from cavsumo.egos.controller import ControllerEgo, controller_class
-from cavsumo.egos.external import EXTERNAL, command_words
-from cavsumo.imports import source_file
-from cavsumo.registry import Registry
+from cavsumo.egos.external.ego import EXTERNAL, command_words
+from cavsumo.model.plugins import source_file
+from cavsumo.model.registry import Registry
 
 # What an ego may be called besides a registered name, for listings.
 FORMS: Mapping[str, str] = {

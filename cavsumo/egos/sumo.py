@@ -7,9 +7,9 @@ import math
 from collections.abc import Mapping
 from typing import Any, ClassVar
 
-from cavsumo.checks import number
 from cavsumo.egos.base import EGO_KIND, EGOS, Ego
 from cavsumo.errors import InputError, UnknownName
+from cavsumo.model.checks import number
 
 # Attributes of vType in SUMO 1.28 (its documentation, "Definition of Vehicles, Vehicle Types, and
 # Routes"); SUMO itself ignores unknown ones without a word.

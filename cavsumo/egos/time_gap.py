@@ -14,10 +14,10 @@ import math
 from collections.abc import Iterator, Mapping
 from typing import ClassVar
 
-from cavsumo.checks import number
 from cavsumo.egos.base import EGOS, Acceleration, Command, Ego
-from cavsumo.scene import Scene
-from cavsumo.snapshot import BodyState, Snapshot
+from cavsumo.model.checks import number
+from cavsumo.model.scene import Scene
+from cavsumo.model.snapshot import BodyState, Snapshot
 
 SIGHT_M = 80.0
 

@@ -10,33 +10,33 @@ from gymnasium import spaces
 from gymnasium.error import ResetNeeded
 from numpy.typing import NDArray
 
-from cavsumo.checks import choice
+from cavsumo.batch.prepared import PreparedBatch
 from cavsumo.envs.elsewhere import Elsewhere
 from cavsumo.envs.episodes import Episodes, Seen
 from cavsumo.envs.settings import PROCESSES, Roles
 from cavsumo.envs.spaces import ActionSpace, Vector, numbers
 from cavsumo.errors import InputError
-from cavsumo.setting import Setting
+from cavsumo.model.checks import choice
 
 RENDER_MODES = ("rgb_array",)
 
 
-class Play:
-    """A setting being played, here or elsewhere, and its pictures."""
+class RunningScenario:
+    """A prepared batch whose scenario is played, here or elsewhere, and its pictures."""
 
-    def __init__(self, setting: Setting, roles: Roles, process: str) -> None:
+    def __init__(self, prepared: PreparedBatch, roles: Roles, process: str) -> None:
         try:
             choice("process", process, PROCESSES)
         except ValueError as error:
             raise InputError(f"{roles.named}: {error}") from error
-        self.episodes = (Episodes if process == "this" else Elsewhere)(setting, roles)
-        scenario = setting.plan.scenario
+        self.episodes = (Episodes if process == "this" else Elsewhere)(prepared, roles)
+        scenario = prepared.plan.scenario
         self.fps = max(1, round(1.0 / (scenario.step_length * roles.hold)))
         self._painter: Any = None
         if roles.drawn:
             from cavsumo.envs.painting import Painter
 
-            self._painter = Painter(setting)
+            self._painter = Painter(prepared)
 
     def picture(self) -> NDArray[np.uint8]:
         """What there is to be seen now."""
@@ -48,7 +48,7 @@ class OneLearner(gymnasium.Env[Any, Any]):
     """A Gymnasium environment in which one role is moved from outside.
 
     Attributes:
-        setting: the scenario, checked, and its site.
+        prepared: the scenario, checked, and its site.
     """
 
     metadata: dict[str, Any] = {"render_modes": list(RENDER_MODES), "render_fps": 10}  # noqa: RUF012
@@ -56,11 +56,17 @@ class OneLearner(gymnasium.Env[Any, Any]):
     observation_space: spaces.Box
 
     def __init__(
-        self, setting: Setting, roles: Roles, *, learner: str, process: str, render_mode: str | None
+        self,
+        prepared: PreparedBatch,
+        roles: Roles,
+        *,
+        learner: str,
+        process: str,
+        render_mode: str | None,
     ) -> None:
         check_render_mode(render_mode, roles.named)
-        self.setting, self.render_mode, self._learner = setting, render_mode, learner
-        self._play = Play(setting, roles, process)
+        self.prepared, self.render_mode, self._learner = prepared, render_mode, learner
+        self._play = RunningScenario(prepared, roles, process)
         self.metadata = {**type(self).metadata, "render_fps": self._play.fps}
         self._under_way = False
 

@@ -10,8 +10,8 @@ import numpy as np
 from gymnasium import spaces
 from numpy.typing import NDArray
 
-from cavsumo.checks import whole
 from cavsumo.errors import InputError
+from cavsumo.model.checks import whole
 
 
 class DiscreteActions(gymnasium.ActionWrapper[Any, np.int64, Any]):

@@ -5,11 +5,11 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-from cavsumo.ego_observations import entries
 from cavsumo.envs.base import OneLearner
+from cavsumo.envs.ego_observations import entries
 from cavsumo.envs.episodes import EGO
 from cavsumo.envs.puppets import PuppetEgo
-from cavsumo.envs.settings import Roles, setting_for
+from cavsumo.envs.settings import Roles, prepared_for
 from cavsumo.envs.spaces import normalised, observation_space
 
 
@@ -52,8 +52,8 @@ class EgoEnv(OneLearner):
             drawn=render_mode is not None,
             named="cavsumo/Ego-v0",
         )
-        setting = setting_for(roles, config, settings, one_team=False)
-        super().__init__(setting, roles, learner=EGO, process=process, render_mode=render_mode)
+        prepared = prepared_for(roles, config, settings, one_team=False)
+        super().__init__(prepared, roles, learner=EGO, process=process, render_mode=render_mode)
         ego = PuppetEgo(**driver)  # type: ignore[arg-type]
         self.action_space = normalised(2 if ego.steers else 1)
         self.observation_space = observation_space(entries(ego.kind))

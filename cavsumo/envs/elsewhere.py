@@ -15,25 +15,25 @@ from multiprocessing import Pipe
 from multiprocessing.connection import Connection
 from typing import Any
 
+from cavsumo.batch.prepared import PreparedBatch
 from cavsumo.envs.episodes import Seen
 from cavsumo.envs.settings import Roles
 from cavsumo.errors import CavsumoError, SimulationError
-from cavsumo.processes import inner_environment
-from cavsumo.setting import Setting
-from cavsumo.snapshot import Snapshot
+from cavsumo.model.processes import inner_environment
+from cavsumo.model.snapshot import Snapshot
 
 
 class Elsewhere:
     """What ``Episodes`` is, in a child process that ``reset`` starts when there is none."""
 
-    def __init__(self, setting: Setting, roles: Roles) -> None:
-        self._setting, self._roles = setting, roles
+    def __init__(self, prepared: PreparedBatch, roles: Roles) -> None:
+        self._prepared, self._roles = prepared, roles
         self._child: _Child | None = None
 
     def reset(self, seed: int) -> Seen:
         """As ``Episodes.reset``."""
         if self._child is None:
-            self._child = _Child(self._setting, self._roles)
+            self._child = _Child(self._prepared, self._roles)
         seen: Seen = self._ask("reset", seed)
         return seen
 
@@ -59,7 +59,7 @@ class Elsewhere:
             raise SimulationError("no episode is under way; reset first")
         try:
             answer = self._child.call(method, *arguments)
-        except _Gone as gone:
+        except _ChildGone as gone:
             self.close()
             raise SimulationError(f"{gone}; reset starts another one") from None
         except BaseException:  # interrupted: the answer must not be taken for the next one's
@@ -70,22 +70,22 @@ class Elsewhere:
         return answer
 
 
-class _Gone(Exception):
+class _ChildGone(Exception):
     """The process died or was too slow; the message says how."""
 
 
 class _Child:
     """One process; ended at the latest with the object."""
 
-    def __init__(self, setting: Setting, roles: Roles) -> None:
+    def __init__(self, prepared: PreparedBatch, roles: Roles) -> None:
         self._pipe, theirs = Pipe()
-        self._deadline = setting.plan.deadline_s
+        self._deadline = prepared.plan.deadline_s
         numbers = str(theirs.fileno()), str(os.getpid())
         try:
             self._process = subprocess.Popen(
                 [sys.executable, "-P", "-m", "cavsumo.envs.elsewhere_process", *numbers],
                 pass_fds=(theirs.fileno(),),
-                cwd=setting.folder,
+                cwd=prepared.folder,
                 env=inner_environment(),
                 stdin=subprocess.DEVNULL,
                 process_group=0,
@@ -95,7 +95,7 @@ class _Child:
         finally:
             theirs.close()
         self.end = weakref.finalize(self, _end, self._process, self._pipe, os.getpid())
-        self._pipe.send((setting, roles))
+        self._pipe.send((prepared, roles))
 
     def call(self, method: str, *arguments: Any) -> Any:
         """Send a call and wait for what it returned or raised."""
@@ -106,8 +106,10 @@ class _Child:
         except (EOFError, OSError):
             code = self._process.wait(5.0)
             ended = f"died of signal {-code}" if code < 0 else f"ended with status {code}"
-            raise _Gone(f"the simulation process {ended}") from None
-        raise _Gone(f"the simulation process did not answer within {self._deadline:g} s, killed")
+            raise _ChildGone(f"the simulation process {ended}") from None
+        raise _ChildGone(
+            f"the simulation process did not answer within {self._deadline:g} s, killed"
+        )
 
 
 def _end(process: subprocess.Popen[bytes], pipe: Connection, owner: int) -> None:

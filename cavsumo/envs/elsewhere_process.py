@@ -9,9 +9,9 @@ import tempfile
 from multiprocessing.connection import Connection
 from typing import Any
 
+from cavsumo.batch.worker_process import divert_output
 from cavsumo.errors import CavsumoError, SimulationError
-from cavsumo.processes import leash
-from cavsumo.worker_process import divert_output
+from cavsumo.model.processes import leash
 
 
 def main(pipe_fd: int, parent: int) -> None:

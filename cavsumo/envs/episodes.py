@@ -10,20 +10,20 @@ import weakref
 from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
-from cavsumo.bodies import Body
-from cavsumo.ego_observations import EgoObserver
-from cavsumo.ego_rewards import EgoLedger
-from cavsumo.envs.events import Watch
+from cavsumo.agents.casting import make_agents
+from cavsumo.agents.observations import TeamObserver
+from cavsumo.batch.prepared import PreparedBatch
+from cavsumo.envs.ego_observations import EgoObserver
+from cavsumo.envs.ego_rewards import EgoLedger
+from cavsumo.envs.events import EventDetector
 from cavsumo.envs.puppets import PuppetAgent, PuppetEgo
 from cavsumo.envs.settings import Roles
 from cavsumo.envs.spaces import Vector
 from cavsumo.errors import SimulationError, SimulationTaken
-from cavsumo.jobs import make_agents
-from cavsumo.observations import Observer
-from cavsumo.setting import Setting
-from cavsumo.simulator import Performance
-from cavsumo.snapshot import Snapshot
-from cavsumo.stage import Stage, set_stage
+from cavsumo.model.bodies import Body
+from cavsumo.model.snapshot import Snapshot
+from cavsumo.simulation.loop import EpisodeLoop
+from cavsumo.simulation.setup import Setup, make_setup
 
 EGO = "ego"
 
@@ -54,25 +54,25 @@ def team_name(bodies: Sequence[Body], team: Sequence[int]) -> str:
 class Episodes:
     """One episode after another; SUMO is started by the first ``reset``."""
 
-    def __init__(self, setting: Setting, roles: Roles) -> None:
-        self._setting, self._roles = setting, roles
-        self._stage: Stage | None = None
-        self._performance: Performance | None = None
+    def __init__(self, prepared: PreparedBatch, roles: Roles) -> None:
+        self._prepared, self._roles = prepared, roles
+        self._setup: Setup | None = None
+        self._loop: EpisodeLoop | None = None
 
     def reset(self, seed: int) -> Seen:
         """Begin the episode that ``cavsumo run`` plays with this seed."""
-        if self._stage is None:
+        if self._setup is None:
             self._set_up()
-        assert self._stage is not None
-        self._performance = None
-        stage = self._stage
-        performance = Performance(stage, self._agents, seed)
-        scene = performance.scene
-        self._observers = [Observer(scene, team) for team in stage.teams if self._puppets]
+        assert self._setup is not None
+        self._loop = None
+        setup = self._setup
+        loop = EpisodeLoop(setup, self._agents, seed)
+        scene = loop.scene
+        self._observers = [TeamObserver(scene, team) for team in setup.teams if self._puppets]
         self._ego_observer = EgoObserver(scene)
-        self._ledger = EgoLedger(scene, performance.snapshot, steers=self._steers)
-        self._watch = Watch(performance, stage.assertions)
-        self._performance, self._game_over, self._left = performance, False, False
+        self._rewards = EgoLedger(scene, loop.snapshot, steers=self._steers)
+        self._watch = EventDetector(loop, setup.assertions)
+        self._loop, self._game_over, self._left = loop, False, False
         info = self._watch.info() | {"seed": seed}
         return Seen(self._observations(), {}, False, False, info)
 
@@ -82,8 +82,8 @@ class Episodes:
         Args:
             actions: by role, as ``spaces.numbers`` gives them.
         """
-        performance, stage = self._performance, self._stage
-        if performance is None or stage is None:
+        loop, setup = self._loop, self._setup
+        if loop is None or setup is None:
             raise SimulationError("no episode is under way; reset first")
         self._tell(actions)
         rewards = dict.fromkeys(self._names, 0.0)
@@ -91,44 +91,44 @@ class Episodes:
         for _ in range(self._roles.hold):
             if any(ended):  # it was decided before anybody moved
                 break
-            self._advance(performance, rewards)
+            self._advance(loop, rewards)
             ended = self._ended()
         info = self._watch.info()
         if any(ended):
             info["summary"] = self._watch.summary()
-            self._performance = None
+            self._loop = None
         return Seen(self._observations(), rewards, *ended, info)
 
     def snapshot(self) -> Snapshot:
         """What there is to be seen now."""
-        return self._watch.performance.snapshot
+        return self._watch.loop.snapshot
 
     def close(self) -> None:
         """End SUMO and whatever the ego started."""
-        self._performance = None
-        if self._stage is not None:
+        self._loop = None
+        if self._setup is not None:
             self._end()
-            self._stage = None
+            self._setup = None
 
     def _set_up(self) -> None:
-        """Set the stage, without starting SUMO, and cast the roles."""
-        setting, roles = self._setting, self._roles
-        ego = roles.make_ego(setting)
+        """Set up the scenario, without starting SUMO, and build the agents and the ego."""
+        prepared, roles = self._prepared, self._roles
+        ego = roles.make_ego(prepared)
         self._puppet_ego = ego if isinstance(ego, PuppetEgo) else None
         self._steers = self._puppet_ego is not None and self._puppet_ego.steers
-        stage = set_stage(setting.plan.scenario, setting.site, ego)
+        setup = make_setup(prepared.plan.scenario, prepared.site, ego)
         self._puppets: list[PuppetAgent] = []
         if roles.agent is None:
             self._puppets = [
-                PuppetAgent(roles.actions, sees_background=roles.drawn) for _ in stage.teams
+                PuppetAgent(roles.actions, sees_background=roles.drawn) for _ in setup.teams
             ]
-        self._agents = self._puppets or make_agents(setting.plan, roles.agent or "")
-        teams = [team_name(stage.bodies, team) for team in stage.teams if self._puppets]
+        self._agents = self._puppets or make_agents(prepared.plan, roles.agent or "")
+        teams = [team_name(setup.bodies, team) for team in setup.teams if self._puppets]
         self._teams = tuple(teams)
         self._names = (*teams, EGO) if self._puppet_ego else self._teams
-        self._end = weakref.finalize(self, _end, stage, os.getpid())  # if nobody calls close
-        ego.prepare(stage.mission)
-        self._stage = stage
+        self._end = weakref.finalize(self, _end, setup, os.getpid())  # if nobody calls close
+        ego.prepare(setup.mission)
+        self._setup = setup
 
     def _tell(self, actions: Mapping[str, Sequence[float]]) -> None:
         """Tell the puppets what to do."""
@@ -137,53 +137,53 @@ class Episodes:
         if self._puppet_ego is not None:
             self._puppet_ego.told = actions[EGO]
 
-    def _advance(self, performance: Performance, rewards: dict[str, float]) -> None:
+    def _advance(self, loop: EpisodeLoop, rewards: dict[str, float]) -> None:
         """One timestep, and what everybody earned in it."""
-        assert self._stage is not None
-        before = performance.snapshot
+        assert self._setup is not None
+        before = loop.snapshot
         try:
-            feedback = performance.step()
+            feedback = loop.step()
         except SimulationTaken as error:
             raise SimulationTaken(
                 "this process has one simulation, and another environment or world took it; reset "
                 "this one, or play with process='own' or in an AsyncVectorEnv"
             ) from error
-        self._left = performance.snapshot is before
+        self._left = loop.snapshot is before
         if feedback is not None:
             self._game_over = feedback[1]
             for name, reward in zip(self._teams, feedback[0], strict=False):
                 rewards[name] += reward
         if self._puppet_ego is not None:
-            successor = None if self._left else performance.snapshot
-            judgements = [a.judgement for a in self._stage.assertions]
-            rewards[EGO] += self._ledger.reward(successor, judgements)
+            successor = None if self._left else loop.snapshot
+            judgements = [a.judgement for a in self._setup.assertions]
+            rewards[EGO] += self._rewards.reward(successor, judgements)
 
     def _ended(self) -> tuple[bool, bool]:
         """Whether the episode is terminated, and whether it is truncated."""
-        performance, stage = self._performance, self._stage
-        assert performance is not None
-        assert stage is not None
-        if self._ledger.off_road or (self._game_over and self._roles.until == "game"):
+        loop, setup = self._loop, self._setup
+        assert loop is not None
+        assert setup is not None
+        if self._rewards.off_road or (self._game_over and self._roles.until == "game"):
             return True, False
-        if not performance.over:
+        if not loop.over:
             return False, False
-        decided = self._left or all(a.decided for a in stage.assertions)
+        decided = self._left or all(a.decided for a in setup.assertions)
         return decided, not decided
 
     def _observations(self) -> dict[str, Vector]:
         """What each role is shown now."""
-        performance = self._watch.performance
-        views = performance.agent_views if self._observers else ()
+        loop = self._watch.loop
+        views = loop.agent_views if self._observers else ()
         seen = {
             name: observer.vector(view)
             for name, observer, view in zip(self._teams, self._observers, views, strict=True)
         }
         if self._puppet_ego is not None:
-            seen[EGO] = self._ego_observer.vector(performance.ego_view)
+            seen[EGO] = self._ego_observer.vector(loop.ego_view)
         return seen
 
 
-def _end(stage: Stage, owner: int) -> None:
-    """Close a stage in the process that set it up; a fork has only a copy of it."""
+def _end(setup: Setup, owner: int) -> None:
+    """Close a setup in the process that made it; a fork has only a copy of it."""
     if os.getpid() == owner:
-        stage.close()
+        setup.close()

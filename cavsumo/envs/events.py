@@ -6,8 +6,8 @@ from collections.abc import Sequence
 from typing import Any
 
 from cavsumo.assertions.base import NOT_TRIGGERED, UNFAIR, VIOLATED, Assertion
-from cavsumo.simulator import Performance
-from cavsumo.theatre import measured
+from cavsumo.batch.episode_runner import measured
+from cavsumo.simulation.loop import EpisodeLoop
 
 # The keys of ``info`` with their meaning.
 KEYS = {
@@ -21,24 +21,24 @@ KEYS = {
 }
 
 
-class Watch:
+class EventDetector:
     """Follows one episode and says what is new."""
 
-    def __init__(self, performance: Performance, assertions: Sequence[Assertion]) -> None:
-        self.performance, self._assertions = performance, assertions
+    def __init__(self, loop: EpisodeLoop, assertions: Sequence[Assertion]) -> None:
+        self.loop, self._assertions = loop, assertions
         self._known = [NOT_TRIGGERED for _ in assertions]
         self._touched: set[tuple[str, str]] = set()
 
     def info(self) -> dict[str, Any]:
         """Time, verdict and the events since the last call."""
         events = [*self._verdicts(), *self._contacts()]
-        performance = self.performance
-        time, outcome = performance.snapshot.time, performance.outcome
+        loop = self.loop
+        time, outcome = loop.snapshot.time, loop.outcome
         return {"time_s": time, "outcome": outcome, "events": events}
 
     def summary(self) -> dict[str, Any]:
         """The figures of the episode, as far as it went."""
-        figures = measured(self.performance.finished())
+        figures = measured(self.loop.finished())
         return figures | {"decided": not any(a.pending for a in self._assertions)}
 
     def _verdicts(self) -> list[dict[str, Any]]:
@@ -55,16 +55,16 @@ class Watch:
             if judgement.verdict == VIOLATED:
                 events.append({"event": "violation", "time_s": judgement.violation_time} | told)
             if judgement.verdict == UNFAIR:
-                time = self.performance.snapshot.time
+                time = self.loop.snapshot.time
                 events.append({"event": "unfair", "time_s": time} | told)
         return events
 
     def _contacts(self) -> list[dict[str, Any]]:
         """The bodies that the ego began to touch."""
-        pairs = self.performance.contacts.ego_pairs
+        pairs = self.loop.contacts.ego_pairs
         if len(pairs) == len(self._touched):
             return []
         new = sorted(pairs - self._touched)
         self._touched |= pairs
-        time = self.performance.snapshot.time
+        time = self.loop.snapshot.time
         return [{"event": "contact", "time_s": time, "tester": other} for _, other in new]

@@ -14,11 +14,12 @@ import shapely
 from numpy.typing import NDArray
 
 from cavsumo.agents.triggers import MAX_DECEL, REACTION_TIME
-from cavsumo.bodies import WALKING
+from cavsumo.batch.prepared import PreparedBatch
 from cavsumo.errors import InputError
-from cavsumo.geometry import Box, corners, zone_polygons
-from cavsumo.setting import Setting
-from cavsumo.snapshot import BodyState, Snapshot
+from cavsumo.model.bodies import WALKING
+from cavsumo.model.geometry import Box, corners
+from cavsumo.model.snapshot import BodyState, Snapshot
+from cavsumo.model.stopping_zones import zone_polygons
 
 try:
     from PIL import Image, ImageDraw, ImageFont
@@ -43,10 +44,10 @@ Points = Sequence[tuple[float, float]]
 
 
 class Painter:
-    """Paints the snapshots of a setting."""
+    """Paints the snapshots of a scenario."""
 
-    def __init__(self, setting: Setting) -> None:
-        site = setting.site
+    def __init__(self, prepared: PreparedBatch) -> None:
+        site = prepared.site
         self._path, self._lights = site.route.path, site.lights
         self._carriageway, self._lanes = site.roads.carriageway, site.roads.lanes
         self._pavements = shapely.union_all(
@@ -57,7 +58,7 @@ class Painter:
         )
         self._crossings = site.crossings
         self._font = ImageFont.load_default(15 * FINER)
-        params = setting.plan.scenario.assertion_params
+        params = prepared.plan.scenario.assertion_params
         self._decel = float(params.get("max_decel", MAX_DECEL))
         self._reaction = float(params.get("reaction_time", REACTION_TIME))
 

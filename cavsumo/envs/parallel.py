@@ -12,11 +12,13 @@ from gymnasium.error import ResetNeeded
 from gymnasium.utils import seeding
 from numpy.typing import NDArray
 
-from cavsumo import ego_observations, observations
-from cavsumo.envs.base import RENDER_MODES, Play, check_render_mode
+from cavsumo.agents import observations
+from cavsumo.agents.casting import teams, tester_bodies
+from cavsumo.envs import ego_observations
+from cavsumo.envs.base import RENDER_MODES, RunningScenario, check_render_mode
 from cavsumo.envs.episodes import EGO, Seen, team_name
 from cavsumo.envs.puppets import PuppetEgo
-from cavsumo.envs.settings import Roles, setting_for
+from cavsumo.envs.settings import Roles, prepared_for
 from cavsumo.envs.spaces import (
     ActionSpace,
     Vector,
@@ -26,7 +28,6 @@ from cavsumo.envs.spaces import (
     team_space,
 )
 from cavsumo.errors import AgentError, InputError
-from cavsumo.jobs import teams, tester_bodies
 
 try:
     from pettingzoo import ParallelEnv
@@ -85,9 +86,9 @@ class CavsumoParallelEnv(ParallelEnv[str, Vector, Any]):  # type: ignore[misc]
             drawn=render_mode is not None,
             named=named,
         )
-        self.setting = setting_for(roles, config, settings, one_team=False)
+        self.prepared = prepared_for(roles, config, settings, one_team=False)
         self.render_mode, self._zero_sum = render_mode, zero_sum
-        self._play = Play(self.setting, roles, process)
+        self._play = RunningScenario(self.prepared, roles, process)
         self.metadata = {**type(self).metadata, "render_fps": self._play.fps}  # type: ignore[misc]
         self._spaces = self._made_spaces(PuppetEgo(**driver), actions)  # type: ignore[arg-type]
         self.possible_agents = list(self._spaces)
@@ -98,7 +99,7 @@ class CavsumoParallelEnv(ParallelEnv[str, Vector, Any]):  # type: ignore[misc]
         self, ego: PuppetEgo, actions: str
     ) -> dict[str, tuple[spaces.Box, ActionSpace]]:
         """The spaces of observations and actions of each agent."""
-        scenario = self.setting.plan.scenario
+        scenario = self.prepared.plan.scenario
         bodies = tester_bodies(scenario)
         made: dict[str, tuple[spaces.Box, ActionSpace]] = {}
         for team in teams(scenario):

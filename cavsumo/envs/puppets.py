@@ -10,12 +10,12 @@ import numpy as np
 from cavsumo.agents.base import Agent
 from cavsumo.agents.features import across, towards
 from cavsumo.agents.policy import effort
-from cavsumo.bodies import Action
-from cavsumo.checks import choice, number
 from cavsumo.egos.base import EGO_KIND, Acceleration, Command, Drive, Ego
 from cavsumo.errors import InputError
-from cavsumo.scene import Scene
-from cavsumo.snapshot import Snapshot
+from cavsumo.model.bodies import Action
+from cavsumo.model.checks import choice, number
+from cavsumo.model.scene import Scene
+from cavsumo.model.snapshot import Snapshot
 
 CONTROLS = ("acceleration", "drive")
 ACTIONS = ("effectors", "targets")

@@ -7,16 +7,16 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from cavsumo.bodies import WALKING
-from cavsumo.checks import choice, whole
-from cavsumo.config import read_config
+from cavsumo.agents.casting import learners
+from cavsumo.batch.prepared import PreparedBatch, prepare
 from cavsumo.egos import make_ego
 from cavsumo.egos.base import Ego
 from cavsumo.envs.puppets import ACTIONS, PuppetEgo
 from cavsumo.errors import InputError, UnknownName
-from cavsumo.jobs import learners
-from cavsumo.scenario import SCENARIO_KEYS, plan_from
-from cavsumo.setting import Setting, prepare
+from cavsumo.model.bodies import WALKING
+from cavsumo.model.checks import choice, whole
+from cavsumo.model.scenario import SCENARIO_KEYS, plan_from
+from cavsumo.model.scenario_file import read_config
 
 UNTIL = ("game", "verdict")
 PROCESSES = ("this", "own")
@@ -53,18 +53,18 @@ class Roles:
         except ValueError as error:
             raise InputError(f"{self.named}: {error}") from error
 
-    def make_ego(self, setting: Setting) -> Ego:
+    def make_ego(self, prepared: PreparedBatch) -> Ego:
         """The ego that drives."""
         if self.ego is not None:
             return PuppetEgo(**self.ego)
-        scenario = setting.plan.scenario
+        scenario = prepared.plan.scenario
         return make_ego(scenario.ego, scenario.ego_params)
 
 
-def setting_for(
+def prepared_for(
     roles: Roles, config: str | Path | None, given: Mapping[str, Any], *, one_team: bool
-) -> Setting:
-    """The setting of an environment; raises InputError in one sentence.
+) -> PreparedBatch:
+    """What an environment plays, checked; raises InputError in one sentence.
 
     Args:
         config: a scenario file, whose batch settings are left aside.

@@ -16,8 +16,8 @@ from gymnasium import spaces
 from numpy.typing import NDArray
 
 from cavsumo.agents.features import TARGETS
-from cavsumo.bodies import Body, model_of
 from cavsumo.errors import AgentError
+from cavsumo.model.bodies import Body, model_of
 
 Vector = NDArray[np.float32]
 ActionSpace = spaces.Box | spaces.MultiDiscrete

@@ -5,12 +5,12 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
+from cavsumo.agents.casting import teams, tester_bodies
+from cavsumo.agents.observations import entries
 from cavsumo.envs.base import OneLearner
 from cavsumo.envs.episodes import team_name
-from cavsumo.envs.settings import Roles, setting_for
+from cavsumo.envs.settings import Roles, prepared_for
 from cavsumo.envs.spaces import observation_space, team_space
-from cavsumo.jobs import teams, tester_bodies
-from cavsumo.observations import entries
 
 
 class TesterEnv(OneLearner):
@@ -46,14 +46,14 @@ class TesterEnv(OneLearner):
         named = "cavsumo/Tester-v0"
         drawn = render_mode is not None
         roles = Roles(until=until, hold=hold, actions=actions, drawn=drawn, named=named)
-        setting = setting_for(roles, config, settings, one_team=True)
-        bodies = tester_bodies(setting.plan.scenario)
-        (team,) = teams(setting.plan.scenario)
+        prepared = prepared_for(roles, config, settings, one_team=True)
+        bodies = tester_bodies(prepared.plan.scenario)
+        (team,) = teams(prepared.plan.scenario)
         learner = team_name(bodies, team)
-        super().__init__(setting, roles, learner=learner, process=process, render_mode=render_mode)
+        super().__init__(prepared, roles, learner=learner, process=process, render_mode=render_mode)
         self.action_space = team_space(bodies, actions)
         kind = bodies[0].kind
-        ego = roles.make_ego(setting)
+        ego = roles.make_ego(prepared)
         self.observation_space = observation_space(
             entries(len(bodies), kind.v_max, ego.kind.steering_max)
         )

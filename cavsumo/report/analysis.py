@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from cavsumo.report.compare import Comparison, comparisons
+from cavsumo.report.compare import PairedComparison, comparisons
 from cavsumo.report.distinct import Distinct, FailureCell, distinct, failure_cells
 from cavsumo.report.effort import Effort, effort
 from cavsumo.report.events import Described, described
@@ -34,7 +34,7 @@ class Report:
     evidence: Evidence
     groups: Sequence[Group]
     rates: Sequence[Rates]
-    comparisons: Sequence[Comparison]
+    comparisons: Sequence[PairedComparison]
     times: Sequence[TimeToTest]
     efforts: Sequence[Effort]
     distinct: Sequence[Distinct]

@@ -28,7 +28,7 @@ EVENTS: dict[str, Callable[[pandas.DataFrame], pandas.Series]] = {
 
 
 @dataclass(frozen=True)
-class Comparison:
+class PairedComparison:
     """Two groups on the same seeds.
 
     Attributes:
@@ -56,7 +56,7 @@ class Comparison:
     sequential: bool
 
 
-def comparisons(groups: Sequence[Group], by: str = "agent") -> list[Comparison]:
+def comparisons(groups: Sequence[Group], by: str = "agent") -> list[PairedComparison]:
     """All pairs of groups that differ in what rows are grouped by and in nothing else.
 
     The later one comes first, so that the first agent named is what others are compared with.
@@ -78,11 +78,11 @@ def _comparable(groups: Sequence[Group], by: str) -> Iterator[tuple[Group, Group
             yield one, other
 
 
-def _compared(first: Group, second: Group, event: str, by: str) -> Comparison:
+def _compared(first: Group, second: Group, event: str, by: str) -> PairedComparison:
     """One comparison, its p-value not yet adjusted."""
     pairs = paired(first, second, event)
     sequential = first.sequential or second.sequential
-    return Comparison(
+    return PairedComparison(
         first.setting,
         "" if by == "agent" else first.agent,
         first.agent if by == "agent" else first.value,

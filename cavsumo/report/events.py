@@ -15,7 +15,7 @@ import pandas
 
 from cavsumo.egos.base import EGO_KIND
 from cavsumo.report.load import Evidence
-from cavsumo.traces import read_moments
+from cavsumo.results.traces import read_moments
 
 Pose = Sequence[float]  # x, y [m], v [m/s], o [rad]
 Moment = tuple[float, dict[str, Any]]  # how far the ego has driven [m], the frame

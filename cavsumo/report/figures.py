@@ -8,11 +8,11 @@ from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 from cavsumo.report.analysis import Report
-from cavsumo.report.compare import Comparison
+from cavsumo.report.compare import PairedComparison
 from cavsumo.report.effort import PerSecond
 from cavsumo.report.load import Batch
 from cavsumo.report.rates import Share
-from cavsumo.statistics import Rate
+from cavsumo.results.statistics import Rate
 
 FORMAT = "cavsumo-report-1"
 COLUMNS = ("section", "setting", "agent", "group", "quantity", "value", "low", "high", "method")
@@ -128,7 +128,7 @@ def _ends(rate: Rate) -> tuple[float | None, float | None]:
     return rate.low, rate.high
 
 
-def _comparison_lines(one: Comparison) -> Iterator[Line]:
+def _comparison_lines(one: PairedComparison) -> Iterator[Line]:
     """The figures of a comparison."""
     head = (f"comparison of {one.event}", one.setting, one.agent, f"{one.first} : {one.second}")
     for name, count in one.pairs._asdict().items():

@@ -11,7 +11,7 @@ import pandas
 
 from cavsumo.errors import InputError
 from cavsumo.report.load import Batch, Evidence
-from cavsumo.setting import EXTENT, differences
+from cavsumo.results.provenance import EXTENT, differences
 
 MOST = 200  # groups; more is no report
 # Settings in which batches may differ and still be told together.
@@ -70,8 +70,9 @@ class Group(Told):
 def grouped(evidence: Evidence, by: str = "agent") -> list[Group]:
     """The groups in the order of settings, and of first appearance in each.
 
-    Batches whose scenarios, files and versions agree are one setting (``setting.differences``), so
-    shards and batches of other seeds are told together; but each episode counts once.
+    Batches whose scenarios, files and versions agree are one setting
+    (``provenance.differences``), so shards and batches of other seeds are told together; but each
+    episode counts once.
     """
     if by != "file":  # which tells them apart
         _check_once(evidence)

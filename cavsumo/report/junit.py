@@ -10,11 +10,11 @@ from typing import Any
 
 import pandas
 
-from cavsumo.outcomes import verdicts_of
+from cavsumo.batch.summary import event, interval, percent
 from cavsumo.report.grouping import Group
 from cavsumo.report.load import Batch, Evidence
 from cavsumo.report.rates import Rates, rates
-from cavsumo.summary import event, interval, percent
+from cavsumo.results.rows import verdicts_of
 
 SHOWN = 20  # failures or errors told of in one case
 # What XML 1.0 cannot hold, even escaped.

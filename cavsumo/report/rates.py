@@ -7,9 +7,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 from cavsumo.assertions.base import VIOLATED
+from cavsumo.batch.tally import Found
 from cavsumo.report.grouping import Group, Told
-from cavsumo.statistics import Rate, rate, sequential_rate
-from cavsumo.tally import Found
+from cavsumo.results.statistics import Rate, rate, sequential_rate
 
 NO_RULE = "no rule"  # of those that blame knows
 WILSON, EXACT, SEQUENTIAL = "Wilson", "Clopper-Pearson", "confidence sequence"

@@ -4,15 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 
+from cavsumo.batch.summary import interval, percent
 from cavsumo.report.analysis import Report
 from cavsumo.report.cells import Labels, Table, number, p_value, span
-from cavsumo.report.compare import EVENTS, Comparison
+from cavsumo.report.compare import EVENTS, PairedComparison
 from cavsumo.report.distinct import PLACE_BIN, SPEED_BIN, Distinct, Diversity, FailureCell
 from cavsumo.report.effort import Effort, PerSecond
 from cavsumo.report.load import Batch
 from cavsumo.report.rates import EXACT, SEQUENTIAL, WILSON, Rates, Share
 from cavsumo.report.survival import TimeToTest
-from cavsumo.summary import interval, percent
 
 SHOWN = 10  # cells of failures
 
@@ -132,7 +132,7 @@ def _comparisons(report: Report, labels: Labels) -> Iterator[Table]:
             yield Table("pairs", title, (*words, "first : second"), numbers, rows, notes)
 
 
-def _comparison(one: Comparison, words: Sequence[str]) -> list[str]:
+def _comparison(one: PairedComparison, words: Sequence[str]) -> list[str]:
     """One line of them."""
     who = [getattr(one, word) for word in words]
     return [
@@ -148,7 +148,7 @@ def _comparison(one: Comparison, words: Sequence[str]) -> list[str]:
     ]
 
 
-def _comparison_notes(found: Sequence[Comparison]) -> list[str]:
+def _comparison_notes(found: Sequence[PairedComparison]) -> list[str]:
     """By which methods."""
     methods = []
     if any(not one.sequential for one in found):

@@ -10,20 +10,20 @@ from collections.abc import Callable, Mapping, Sequence
 import numpy as np
 
 from cavsumo.agents.base import Agent
-from cavsumo.bodies import Action
 from cavsumo.egos.base import EGO_KIND
-from cavsumo.scene import Scene
-from cavsumo.snapshot import BodyState, Snapshot
-from cavsumo.testing.scripts import CROWDED, EMPTY, ODD, Ground, Script, driven
+from cavsumo.model.bodies import Action
+from cavsumo.model.scene import Scene
+from cavsumo.model.snapshot import BodyState, Snapshot
+from cavsumo.testing.scripts import CROWDED, EMPTY, ODD, Script, ScriptNetwork, driven
 
 MakeAgent = Callable[[], Agent]
-Check = Callable[[MakeAgent, Ground], str]
+Check = Callable[[MakeAgent, ScriptNetwork], str]
 TESTERS, OWNED = 4, (0, 2)
 EGO_SPEED = 7.0  # m/s
 Joint = tuple[Action, ...]
 
 
-def choices(agent: Agent, ground: Ground, script: Script, seed: int = 1) -> list[Joint]:
+def choices(agent: Agent, ground: ScriptNetwork, script: Script, seed: int = 1) -> list[Joint]:
     """What an agent with two of four bodies does in a script, each action checked.
 
     The ego drives past at constant speed; bodies of others stand.
@@ -67,14 +67,14 @@ def check_actions(joint: Sequence[Action], states: Sequence[BodyState], at: str)
 # The checks
 
 
-def check_acts_for_its_bodies(make: MakeAgent, ground: Ground) -> str:
+def check_acts_for_its_bodies(make: MakeAgent, ground: ScriptNetwork) -> str:
     """One action that can be executed for each body it owns, on an empty and a crowded road."""
     agent = make()
     count = len(choices(agent, ground, EMPTY)) + len(choices(agent, ground, CROWDED))
     return f"{count} joint actions"
 
 
-def check_repeatable(make: MakeAgent, ground: Ground) -> str:
+def check_repeatable(make: MakeAgent, ground: ScriptNetwork) -> str:
     """The same scene, generator and memory: the same actions, whatever was in between."""
     agent = make()
     known = agent.recall()
@@ -87,7 +87,7 @@ def check_repeatable(make: MakeAgent, ground: Ground) -> str:
     return f"{len(first)} joint actions, three times the same"
 
 
-def check_draws_from_its_generator_only(make: MakeAgent, ground: Ground) -> str:
+def check_draws_from_its_generator_only(make: MakeAgent, ground: ScriptNetwork) -> str:
     """The generators that all share are left alone."""
     before = random.getstate(), repr(np.random.get_state())
     choices(make(), ground, CROWDED)
@@ -96,7 +96,7 @@ def check_draws_from_its_generator_only(make: MakeAgent, ground: Ground) -> str:
     return "draws from its own only"
 
 
-def check_memory(make: MakeAgent, ground: Ground) -> str:
+def check_memory(make: MakeAgent, ground: ScriptNetwork) -> str:
     """What it learned is plain data, and another one that takes it up acts alike."""
     agent = make()
     choices(agent, ground, CROWDED)
@@ -113,7 +113,7 @@ def check_memory(make: MakeAgent, ground: Ground) -> str:
     return f"{len(text)} bytes"
 
 
-def check_sees_what_it_says(make: MakeAgent, ground: Ground) -> str:
+def check_sees_what_it_says(make: MakeAgent, ground: ScriptNetwork) -> str:
     """An agent that says it does not look at the background does not."""
     if make().sees_background:
         return "looks at the background"
@@ -122,7 +122,7 @@ def check_sees_what_it_says(make: MakeAgent, ground: Ground) -> str:
     return "the background changes nothing"
 
 
-def check_odd_numbers(make: MakeAgent, ground: Ground) -> str:
+def check_odd_numbers(make: MakeAgent, ground: ScriptNetwork) -> str:
     """Tiny, huge and negative numbers, names with quotes."""
     return f"{len(choices(make(), ground, ODD))} joint actions"
 

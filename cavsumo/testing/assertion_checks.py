@@ -8,19 +8,21 @@ from collections.abc import Callable, Iterator, Mapping
 import numpy as np
 
 from cavsumo.assertions.base import NOT_TRIGGERED, SEVERITY, VIOLATED, Assertion, Judgement
-from cavsumo.contacts import Contact, ContactMonitor
+from cavsumo.assertions.contacts import Contact, ContactMonitor
 from cavsumo.egos.base import EGO_KIND
-from cavsumo.scene import Scene
-from cavsumo.snapshot import BodyState, Snapshot
-from cavsumo.testing.scripts import Ground, Others, crowd, nobody, oddities
+from cavsumo.model.scene import Scene
+from cavsumo.model.snapshot import BodyState, Snapshot
+from cavsumo.testing.scripts import Others, ScriptNetwork, crowd, nobody, oddities
 
 MakeAssertion = Callable[[], Assertion]
-Check = Callable[[MakeAssertion, Ground], str]
+Check = Callable[[MakeAssertion, ScriptNetwork], str]
 Frame = tuple[Snapshot, list[Contact]]
 ENCOUNTERS, STEPS = 30, 150
 
 
-def encounter(ground: Ground, seed: int, others: Others = nobody) -> tuple[Scene, list[Frame]]:
+def encounter(
+    ground: ScriptNetwork, seed: int, others: Others = nobody
+) -> tuple[Scene, list[Frame]]:
     """An ego that drives its way and brakes at some moment, and a tester who crosses at another."""
     scene = ground.scene(EGO_KIND, seed, 1)
     rng = np.random.default_rng(seed)
@@ -82,7 +84,7 @@ def check_judgement(assertion: Assertion, said: Judgement, now: float, at: str) 
 # The checks
 
 
-def check_encounters(make: MakeAssertion, ground: Ground) -> str:
+def check_encounters(make: MakeAssertion, ground: ScriptNetwork) -> str:
     """Thirty encounters: every judgement agrees with itself, what is decided stays."""
     assertion, found = make(), []
     for seed in range(ENCOUNTERS):
@@ -90,7 +92,7 @@ def check_encounters(make: MakeAssertion, ground: Ground) -> str:
     return ", ".join(f"{found.count(v)} {v}" for v in SEVERITY if v in found)
 
 
-def check_reset_forgets(make: MakeAssertion, ground: Ground) -> str:
+def check_reset_forgets(make: MakeAssertion, ground: ScriptNetwork) -> str:
     """The same encounter is judged the same, whatever was judged before."""
     used = make()
     for seed in range(10):
@@ -100,7 +102,7 @@ def check_reset_forgets(make: MakeAssertion, ground: Ground) -> str:
     return "10 encounters judged alike"
 
 
-def check_sees_what_it_says(make: MakeAssertion, ground: Ground) -> str:
+def check_sees_what_it_says(make: MakeAssertion, ground: ScriptNetwork) -> str:
     """An assertion that says it does not look at the background does not."""
     if make().sees_background:
         return "looks at the background"
@@ -111,7 +113,7 @@ def check_sees_what_it_says(make: MakeAssertion, ground: Ground) -> str:
     return "the background changes nothing"
 
 
-def check_odd_numbers(make: MakeAssertion, ground: Ground) -> str:
+def check_odd_numbers(make: MakeAssertion, ground: ScriptNetwork) -> str:
     """Tiny, huge and negative numbers, names with quotes."""
     count = sum(1 for _ in judged(make(), *encounter(ground, 1, oddities)))
     return f"{count} snapshots"

@@ -23,7 +23,7 @@ from cavsumo.agents.base import Agent
 from cavsumo.assertions.base import Assertion
 from cavsumo.egos.base import EGO_KIND, Ego
 from cavsumo.testing import agent_checks, assertion_checks, ego_checks
-from cavsumo.testing.scripts import Ground, ground
+from cavsumo.testing.scripts import ScriptNetwork, ground
 
 __all__ = ["AgentContract", "AssertionContract", "EgoContract"]
 
@@ -37,7 +37,7 @@ class _Contract:
 
     net: Path
 
-    def ground(self) -> Ground:
+    def ground(self) -> ScriptNetwork:
         """Where the drives take place."""
         return ground(self.net, EGO_KIND)
 

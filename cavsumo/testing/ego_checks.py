@@ -12,19 +12,19 @@ import time
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 
-from cavsumo.contacts import STANDING_MPS
+from cavsumo.assertions.contacts import STANDING_MPS
 from cavsumo.egos.base import Acceleration, Command, Ego
 from cavsumo.egos.effectors import checked
 from cavsumo.errors import EgoError
-from cavsumo.snapshot import Snapshot
-from cavsumo.testing.scripts import CROWDED, EMPTY, LONG, ODD, Ground, Script, drive
+from cavsumo.model.snapshot import Snapshot
+from cavsumo.testing.scripts import CROWDED, EMPTY, LONG, ODD, Script, ScriptNetwork, drive
 
 MakeEgo = Callable[[], Ego]
-Check = Callable[[MakeEgo, Ground], str]
+Check = Callable[[MakeEgo, ScriptNetwork], str]
 
 
 @contextmanager
-def prepared(make: MakeEgo, ground: Ground) -> Iterator[Ego]:
+def prepared(make: MakeEgo, ground: ScriptNetwork) -> Iterator[Ego]:
     """An ego that is ready to drive."""
     ego = make()
     try:
@@ -34,7 +34,7 @@ def prepared(make: MakeEgo, ground: Ground) -> Iterator[Ego]:
         ego.close()
 
 
-def commands(ego: Ego, ground: Ground, script: Script, seed: int = 1) -> list[Command]:
+def commands(ego: Ego, ground: ScriptNetwork, script: Script, seed: int = 1) -> list[Command]:
     """The answers of an ego to a script, each of them checked."""
     answers: list[Command] = []
     for snapshot, command in drive(ego, ground, script, seed):
@@ -58,7 +58,7 @@ def check_command(
 # The checks
 
 
-def check_start(make: MakeEgo, ground: Ground) -> str:
+def check_start(make: MakeEgo, ground: ScriptNetwork) -> str:
     """It starts, takes the reset and answers the first snapshot."""
     begun = time.perf_counter()
     with prepared(make, ground) as ego:
@@ -71,7 +71,7 @@ def check_start(make: MakeEgo, ground: Ground) -> str:
     )
 
 
-def check_empty_road(make: MakeEgo, ground: Ground) -> str:
+def check_empty_road(make: MakeEgo, ground: ScriptNetwork) -> str:
     """It drives along an empty road, every answer one that its effectors can execute."""
     speeds: list[float] = []
     with prepared(make, ground) as ego:
@@ -84,7 +84,7 @@ def check_empty_road(make: MakeEgo, ground: Ground) -> str:
     return f"{way:.0f} m in {spent:.1f} s"
 
 
-def check_crowded_road(make: MakeEgo, ground: Ground) -> str:
+def check_crowded_road(make: MakeEgo, ground: ScriptNetwork) -> str:
     """Sixty bodies around it; how long its answers take is said."""
     with prepared(make, ground) as ego:
         waits: list[float] = []
@@ -102,7 +102,7 @@ def check_crowded_road(make: MakeEgo, ground: Ground) -> str:
     return f"median answer {median:.2f} ms, slowest {1e3 * max(waits):.2f} ms"
 
 
-def check_reset_twice(make: MakeEgo, ground: Ground) -> str:
+def check_reset_twice(make: MakeEgo, ground: ScriptNetwork) -> str:
     """The same episode again gets the same answers, after a whole one, a broken one, none."""
     with prepared(make, ground) as ego:
         first = commands(ego, ground, CROWDED)
@@ -114,7 +114,7 @@ def check_reset_twice(make: MakeEgo, ground: Ground) -> str:
     return f"{len(first)} answers, four times the same"
 
 
-def check_two_at_once(make: MakeEgo, ground: Ground) -> str:
+def check_two_at_once(make: MakeEgo, ground: ScriptNetwork) -> str:
     """Two of them, as two processes of a batch have them, do not disturb each other."""
     with prepared(make, ground) as ego, prepared(make, ground) as other:
         alone = commands(ego, ground, CROWDED)
@@ -128,14 +128,14 @@ def check_two_at_once(make: MakeEgo, ground: Ground) -> str:
     return "they do not disturb each other"
 
 
-def check_long_episode(make: MakeEgo, ground: Ground) -> str:
+def check_long_episode(make: MakeEgo, ground: ScriptNetwork) -> str:
     """Ten minutes in a jam."""
     with prepared(make, ground) as ego:
         answers = commands(ego, ground, LONG)
     return f"{len(answers)} answers"
 
 
-def check_odd_numbers(make: MakeEgo, ground: Ground) -> str:
+def check_odd_numbers(make: MakeEgo, ground: ScriptNetwork) -> str:
     """Tiny, huge and negative numbers, headings at the seam, names with quotes."""
     with prepared(make, ground) as ego:
         answers = commands(ego, ground, ODD)

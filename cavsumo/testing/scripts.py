@@ -13,12 +13,12 @@ from pathlib import Path
 
 import numpy as np
 
-from cavsumo.bodies import BICYCLE, BUS, CAR, PEDESTRIAN, Action, Body, Kind
 from cavsumo.egos.base import Acceleration, Command, Drive, Ego, Mission
-from cavsumo.kinematics import step_floats
-from cavsumo.scene import Scene
-from cavsumo.site import Site, derive_site
-from cavsumo.snapshot import BodyState, RawState, Snapshot
+from cavsumo.model.bodies import BICYCLE, BUS, CAR, PEDESTRIAN, Action, Body, Kind
+from cavsumo.model.kinematics import step_floats
+from cavsumo.model.scene import Scene
+from cavsumo.model.snapshot import BodyState, RawState, Snapshot
+from cavsumo.network.site import Site, derive_site
 
 DT = 0.1  # s
 SPEED = 8.0  # of an ego that does not say how fast it begins [m/s]
@@ -27,7 +27,7 @@ LETTERS = "rrruGGGGgy"  # shown for 3 s each
 
 
 @dataclass(frozen=True)
-class Ground:
+class ScriptNetwork:
     """A network on which scripts are played, and the timestep [s]."""
 
     site: Site
@@ -66,9 +66,9 @@ class Script:
     held: bool = False
 
 
-def ground(net: Path, ego: Kind, dt: float = DT) -> Ground:
+def ground(net: Path, ego: Kind, dt: float = DT) -> ScriptNetwork:
     """The ground that a network offers; raises InputError as ``cavsumo run`` does."""
-    return Ground(derive_site(net, (), None, ego), dt)
+    return ScriptNetwork(derive_site(net, (), None, ego), dt)
 
 
 # Scripts
@@ -110,7 +110,7 @@ ODD, LONG = Script(50, oddities), Script(6000, nobody, held=True)
 
 
 def drive(
-    ego: Ego, ground: Ground, script: Script, seed: int
+    ego: Ego, ground: ScriptNetwork, script: Script, seed: int
 ) -> Iterator[tuple[Snapshot, Command]]:
     """Play a script to an ego: each snapshot with its answer, until it has arrived.
 

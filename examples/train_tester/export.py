@@ -8,13 +8,15 @@ import numpy as np
 from stable_baselines3 import DQN
 from stable_baselines3.common.vec_env import VecNormalize
 
-from cavsumo.observations import VERSION, entries
-from cavsumo.policies import Header, Observed, Policy
+from cavsumo.agents.observations import VERSION, entries
+from cavsumo.agents.policy_file import Header, Observed, TrainedPolicy
 
 NOTHING = 1e9  # a scale that leaves nothing of an entry
 
 
-def exported(model: DQN, normaliser: VecNormalize, hold: int, metadata: dict[str, Any]) -> Policy:
+def exported(
+    model: DQN, normaliser: VecNormalize, hold: int, metadata: dict[str, Any]
+) -> TrainedPolicy:
     """The greedy policy of a network that scores the targets of one pedestrian.
 
     Where one pedestrian learned, there was no other, and the network has not learned what to make
@@ -35,7 +37,7 @@ def exported(model: DQN, normaliser: VecNormalize, hold: int, metadata: dict[str
     )
     absent = np.array([name.startswith("other.") for name in names])
     scale = np.where(absent, NOTHING, np.sqrt(seen.var + normaliser.epsilon))
-    return Policy(header, seen.mean.astype(np.float64), scale, tuple(numbers))
+    return TrainedPolicy(header, seen.mean.astype(np.float64), scale, tuple(numbers))
 
 
 def _array(tensor: Any) -> np.ndarray[Any, Any]:

@@ -28,13 +28,13 @@ from stable_baselines3 import DQN
 from stable_baselines3.common.callbacks import BaseCallback
 from stable_baselines3.common.vec_env import DummyVecEnv, VecNormalize
 
-from cavsumo.commands.run import Manner, run
+from cavsumo.agents.observations import entries
+from cavsumo.agents.policy_file import write_policy
+from cavsumo.batch.executors import Means
+from cavsumo.cli.commands.run import Manner, run
 from cavsumo.envs.discrete import DiscreteActions
-from cavsumo.executors import Means
-from cavsumo.observations import entries
-from cavsumo.policies import write_policy
-from cavsumo.results import read_rows
-from cavsumo.statistics import Rate, rate
+from cavsumo.results.reading import read_rows
+from cavsumo.results.statistics import Rate, rate
 
 HOLD = 5  # timesteps that an action lasts
 PASSED_M = -5.0  # an ego that is so far past the body meets it no more

@@ -1,0 +1,177 @@
+"""Whether the testers keep to the rules of the world: a test that breaks them proves nothing.
+
+An episode is invalid if the body that the verdict names broke a rule before it, or any body at the
+start. Where nothing was tested nothing can be invalid: such an episode stays in the rates, or
+agents would be rewarded for wasting it. What a body must not do before the verdict:
+
+* start in another body;
+* get into another body by its own movement, deeper than people and vehicles can: a body that
+  stands gets into nobody, so background traffic that does not see a tester costs it nothing;
+* get into the standing ego and still be there when that drives on;
+* leave the world: on foot farther than STRAY_M from carriageways and pavements, vehicles farther
+  than OFF_ROAD_M from the carriageway, unless at the end of its way out of the network;
+* move as its kind cannot. Actions cannot do that; whoever writes states could.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import NamedTuple
+
+from cavsumo.agents.walking import turn_limit
+from cavsumo.assertions.base import NOT_TRIGGERED, Judgement
+from cavsumo.assertions.contacts import STANDING_MPS, Pair, depth
+from cavsumo.model.bodies import WALKING, Kind
+from cavsumo.model.kinematics import wrap
+from cavsumo.model.scene import Scene
+from cavsumo.model.snapshot import BodyState, Snapshot
+from cavsumo.network.pedestrian_starts import NEAR_M
+
+# How deep one body may get into another [m], by how many of the two are pedestrians of the testers:
+# their box, 0.66 m by 0.88 m, is larger than a person, who brushes past others.
+DEEP_M = {2: 0.3, 1: 0.15, 0: 0.1}
+STARTS_IN = "starts in"
+STRAY_M = NEAR_M  # who starts on a pavement so far from the road may cross the verge between them
+OFF_ROAD_M = 1.0
+ROUNDING = 1e-6  # m, m/s, rad
+
+
+class Breach(NamedTuple):
+    """A rule of the world, broken."""
+
+    time: float  # s
+    tester: str
+    what: str
+
+    def __str__(self) -> str:
+        return f"{self.tester} {self.what} at {self.time:.1f} s"
+
+
+class ValidityMonitor:
+    """Follows one episode.
+
+    Attributes:
+        breaches: the first one of each tester's body, in the order in which they came.
+    """
+
+    def __init__(self, scene: Scene) -> None:
+        self.breaches: dict[str, Breach] = {}
+        self._scene = scene
+        self._index = {body.id: i for i, body in enumerate(scene.bodies)}
+        self._testers: tuple[BodyState, ...] = ()
+        self._depths: dict[tuple[str, str], float] = {}  # how deep who got into whom by itself [m]
+        # Where each was last looked for on the map, and how far from there it cannot have left.
+        self._known = [(math.inf, math.inf, 0.0)] * len(scene.bodies)
+
+    def observe(self, snapshot: Snapshot, pairs: Sequence[Pair]) -> None:
+        """Take in a snapshot and the pairs that touch in it."""
+        if snapshot.step == 0:
+            self._look_at_starts(snapshot, pairs)
+        elif pairs or self._depths:
+            self._look_at_pairs(snapshot, pairs)
+        if snapshot.testers is not self._testers:  # or they all stand where they stood
+            self._look_at_moves(snapshot)
+            self._testers = snapshot.testers
+
+    def _report(self, snapshot: Snapshot, tester: str, what: str) -> None:
+        """The first breach of each body stands."""
+        self.breaches.setdefault(tester, Breach(snapshot.time, tester, what))
+
+    @property
+    def first(self) -> Breach | None:
+        """The first breach of all."""
+        return next(iter(self.breaches.values()), None)
+
+    def spoils(self, judgement: Judgement) -> Breach | None:
+        """The breach that makes an episode with this judgement invalid."""
+        first = self.first
+        if first is None or first.what.startswith(STARTS_IN):
+            return first
+        if judgement.verdict == NOT_TRIGGERED:
+            return None
+        # A verdict that names nobody, or somebody of the background, rests on all of them.
+        return self.breaches.get(judgement.tester) if judgement.tester in self._index else first
+
+    def _look_at_starts(self, snapshot: Snapshot, pairs: Sequence[Pair]) -> None:
+        """Whether a tester starts in another body; touching the ego is enough."""
+        for a, b in pairs:
+            tester, other = (a, b) if a.id in self._index else (b, a)
+            with_ego = other is snapshot.ego
+            if tester.id in self._index and (with_ego or _depth(tester, other) > _allowed(a, b)):
+                self._report(snapshot, tester.id, f"{STARTS_IN} {other.id}")
+
+    def _look_at_pairs(self, snapshot: Snapshot, pairs: Sequence[Pair]) -> None:
+        """Add up how deep each tester gets into others by its own movement."""
+        before, self._depths = self._depths, {}
+        standing = snapshot.ego.v <= STANDING_MPS
+        for a, b in pairs:
+            for one, other in ((a, b), (b, a)):
+                i = self._index.get(one.id)
+                if i is None:
+                    continue
+                key = one.id, other.id
+                deep = before.get(key, 0.0)
+                if other is not snapshot.ego or standing:
+                    deep += max(0.0, _depth(one, other) - _depth(self._testers[i], other))
+                self._depths[key] = deep
+                if deep > _allowed(one, other) and not (other is snapshot.ego and standing):
+                    self._report(snapshot, one.id, f"moved into {other.id}")
+
+    def _look_at_moves(self, snapshot: Snapshot) -> None:
+        """Whether a tester left the world or moved as it cannot."""
+        dt = self._scene.dt
+        for i, body in enumerate(snapshot.testers):
+            before = self._testers[i] if self._testers else body
+            if before is not body and not possible(before, body, dt):
+                self._report(snapshot, body.id, f"moved as no {body.body.kind.name} can")
+            x, y, leeway = self._known[i]
+            if math.hypot(body.x - x, body.y - y) >= leeway and not self._in_world(i, body):
+                self._report(snapshot, body.id, "left the world")
+
+    def _in_world(self, i: int, body: BodyState) -> bool:
+        """Look a body up on the map."""
+        roads, on_foot = self._scene.roads, body.body.kind.name in WALKING
+        if roads is None:
+            self._known[i] = body.x, body.y, math.inf
+            return True
+        far = roads.walking_distance if on_foot else roads.driving_distance
+        room = (STRAY_M if on_foot else OFF_ROAD_M) - far(body.x, body.y)
+        self._known[i] = body.x, body.y, max(0.0, room)
+        return room >= 0.0 or self._drives_out(i, body)
+
+    def _drives_out(self, i: int, body: BodyState) -> bool:
+        """Whether a vehicle is beyond the end of its way, where the network ends."""
+        approach = self._scene.starts[i].approach
+        if approach is None:
+            return False
+        return approach.path.project(body.x, body.y).along >= approach.path.length - OFF_ROAD_M
+
+
+def possible(before: BodyState, after: BodyState, dt: float) -> bool:
+    """Whether a body can have moved so in one timestep (seed, eqs 8 to 19)."""
+    kind, v = before.body.kind, before.v
+    way = math.hypot(after.x - before.x, after.y - before.y)
+    gained = after.v - v
+    return (
+        way <= abs(v) * dt + ROUNDING
+        and kind.v_min - ROUNDING <= after.v <= max(kind.v_max, v) + ROUNDING
+        and gained <= kind.throttle_max * dt + ROUNDING
+        and (gained >= kind.throttle_min * dt - ROUNDING or after.v >= kind.v_max)
+        and abs(wrap(after.o - before.o)) <= turn_limit(kind, abs(v), dt) + ROUNDING
+    )
+
+
+def _depth(a: BodyState, b: BodyState) -> float:
+    """How deep two bodies are in each other [m]."""
+    return depth(a.box, b.box)
+
+
+def _allowed(a: BodyState, b: BodyState) -> float:
+    """How deep they may get [m]."""
+    return DEEP_M[_walks(a.body.kind) + _walks(b.body.kind)]
+
+
+def _walks(kind: Kind) -> bool:
+    """Whether a kind is on foot; SUMO's own persons have boxes of their true size."""
+    return kind.name in WALKING

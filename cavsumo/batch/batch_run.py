@@ -1,0 +1,145 @@
+"""A batch being played into its results file: from the start, from where it stopped, or again."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from concurrent.futures import Executor
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from cavsumo.batch.dispatch import run_batch
+from cavsumo.batch.learning import Lessons
+from cavsumo.batch.prepared import PreparedBatch
+from cavsumo.batch.progress import Progress
+from cavsumo.batch.stopping import stopping_rule
+from cavsumo.batch.tally import Tally
+from cavsumo.batch.worker import Answer
+from cavsumo.errors import BatchError
+from cavsumo.model.scenario import BatchPlan
+from cavsumo.results.reading import COMPLETE, rows_of
+from cavsumo.results.rows import Outcome
+from cavsumo.results.writing import Recorder
+
+LOOK_AHEAD = 4  # episodes under way or waiting for their turn, for each that is played at a time
+
+
+@dataclass
+class BatchRun:
+    """A batch under way; call ``begin`` or ``resume``, then what is to be done, then ``end``.
+
+    Attributes:
+        prepared, recorder: what is played, and who writes it.
+        executor, jobs: who plays it, and how many episodes at a time.
+        stopped: says whether somebody asked to stop.
+        quiet: no progress.
+        tally: what was found, earlier sessions included.
+        status: how the batch stands: finished, stopped (by a rule), interrupted or broken.
+        cut_short: whether somebody stopped it before all errors were played again.
+    """
+
+    prepared: PreparedBatch
+    recorder: Recorder
+    executor: Executor
+    jobs: int
+    stopped: Callable[[], bool]
+    quiet: bool = True
+    tally: Tally = field(default_factory=Tally)
+    status: str = "broken"
+    cut_short: bool = False
+
+    def begin(self, manifest: Mapping[str, Any], *, overwrite: bool = False) -> None:
+        """Start the results file."""
+        self._todo = self.prepared.plan.todo()
+        self._lessons = Lessons(self.prepared, {})
+        self.recorder.begin(manifest, overwrite=overwrite)
+
+    def resume(self, manifest: Mapping[str, Any]) -> None:
+        """Take up the rows that are there."""
+        self._todo = self.prepared.plan.todo()
+        self._lessons = Lessons(self.prepared, manifest)
+        for row in self.recorder.resume(manifest, self._todo):
+            self.tally.add(row)
+            self._lessons.seen(row)
+        self._lessons.catch_up(self.executor)
+        recorded = manifest["status"]
+        self.status = recorded if recorded in COMPLETE else "interrupted"
+
+    def play(self) -> None:
+        """Play what is left, until the end or a reason to stop."""
+        self.status = "broken"
+        rule = stopping_rule(self.prepared.plan)
+        reason = rule(self.tally)
+        with Progress(self.prepared.plan.size, self.quiet, self.tally.rows) as progress:
+            for outcome, memory in self._answers(self._todo) if reason is None else ():
+                row = self.recorder.write(outcome)
+                self.tally.add(row)
+                if self._lessons.learned(row, memory) and self._lessons.due:
+                    self.recorder.checkpoint(self._lessons.facts())
+                progress.update(self.tally)
+                reason = rule(self.tally)
+                if reason is not None:
+                    break
+        missing = self.tally.rows < self.prepared.plan.size
+        self.status = "stopped" if reason else "interrupted" if missing else "finished"
+        self.recorder.manifest["stopped_by"] = reason
+
+    def retry(self) -> None:
+        """Play the episodes again that could not be played.
+
+        An agent that learns missed a lesson then: it starts anew, and its later rows change too.
+        """
+        todo, pupils = _to_retry(self.recorder.csv_file, self.prepared.plan, self._lessons.names)
+        known = self._lessons.known()
+        self._lessons.forget(pupils)
+        replaced: dict[int, Outcome] = {}
+        with Progress(len(todo), self.quiet) as progress:
+            for outcome, memory in self._answers(todo):
+                self._lessons.learned(outcome.row, memory)
+                replaced[outcome.row["run"]] = outcome
+                progress.update(self.tally)
+        self.cut_short = len(replaced) < len(todo)
+        if self.cut_short and pupils:
+            self._lessons.restore(known)
+            raise BatchError("interrupted before the learning agents were done: nothing changed")
+        self.recorder.replace(replaced)
+        self.tally = Tally()
+        for row in rows_of(self.recorder.csv_file):
+            self.tally.add(row)
+
+    def end(self) -> None:
+        """Complete the manifest."""
+        facts = {"episodes": self.tally.rows, "counts": self.tally.all.outcomes}
+        self.recorder.finish(self.status, facts | self._lessons.facts())
+
+    def _answers(self, todo: Iterable[int]) -> Iterator[Answer]:
+        """Have episodes played."""
+        return run_batch(
+            self.prepared,
+            self.executor,
+            todo,
+            memories=self._lessons.memories,
+            ahead=LOOK_AHEAD * self.jobs,
+            stopped=self.stopped,
+        )
+
+
+def _to_retry(
+    csv_file: Path, plan: BatchPlan, learners: frozenset[str]
+) -> tuple[list[int], frozenset[str]]:
+    """The episodes to play again, and which learners start anew because they have any.
+
+    Those are all episodes of such a learner, and all that shared a simulation with an error.
+    """
+    runs: dict[str, list[int]] = {name: [] for name in learners}
+    errors, pupils, last = set(), set(), -1
+    for row in rows_of(csv_file):
+        last = int(row["run"])
+        if row["agent"] in learners:
+            runs[row["agent"]].append(last)
+        if row["outcome"] == "error":
+            errors.add(last // plan.block)
+            pupils |= {row["agent"]} & learners
+    again = {run for group in errors for run in range(group * plan.block, (group + 1) * plan.block)}
+    again |= {run for name in pupils for run in runs[name]}
+    return sorted(run for run in again if run <= last), frozenset(pupils)

@@ -1,0 +1,118 @@
+"""Seeds that were used, and a batch whose episodes have none of them.
+
+SUMO takes a seed modulo 2^31, so seeds that it takes for the same count as the same.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Collection, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from cavsumo.batch.replay import recorded_plan
+from cavsumo.errors import InputError, ResultsError
+from cavsumo.model.scenario import BatchPlan
+from cavsumo.model.seeds import episode_seed
+from cavsumo.results.reading import FORMAT, rows_of
+
+SUMO_SEEDS = 2**31
+ATTEMPTS = 100  # batches that are tried; each fails only where two seeds agree by chance
+
+
+@dataclass(frozen=True)
+class Used:
+    """Seeds that a test has met, or may have.
+
+    Attributes:
+        seeds: of all episodes that are known.
+        results: the batches that they are of.
+        silent: files that an agent learned into and that do not say from which seeds.
+    """
+
+    seeds: frozenset[int]
+    results: tuple[Path, ...]
+    silent: tuple[Path, ...]
+
+
+def used(results: Sequence[Path], params: Mapping[str, Any]) -> Used:
+    """The seeds of results, of those that they came from, and of those that an agent learned from.
+
+    ``params`` are the agent's: a manifest among them (``weights=results.json``) is followed, and
+    so are those in the plans of all these results.
+    """
+    seeds: set[int] = set()
+    known, silent = _files_in(params)
+    todo, done = [*results, *known], dict.fromkeys(silent, False)
+    while todo:
+        csv_file = todo.pop(0)
+        if done.get(csv_file):
+            continue
+        plan, manifest = recorded_plan(csv_file)
+        seeds |= _seeds_of(csv_file, plan)
+        done[csv_file] = True
+        known, silent = _files_in(plan.params)
+        origin = dict(manifest.get("certifies") or {}).get("results", "none")
+        todo += known + [f for f in (Path(origin),) if f.with_suffix(".json").is_file()]
+        done |= dict.fromkeys(silent, False)
+    return Used(
+        frozenset(seeds),
+        tuple(file for file, recorded in done.items() if recorded),
+        tuple(file for file, recorded in done.items() if not recorded),
+    )
+
+
+def _seeds_of(csv_file: Path, plan: BatchPlan) -> set[int]:
+    """The seeds of a batch: of its rows, and of all episodes of its plan, played here or not.
+
+    Where only the manifest is left, those of the plan.
+    """
+    seeds = {episode_seed(plan.seed, i) for i in range(plan.runs)}
+    if plan.scenario.starts_seed is not None:
+        seeds.add(plan.scenario.starts_seed)
+    if not csv_file.is_file():
+        return seeds
+    try:
+        return seeds | {int(row["seed"]) for row in rows_of(csv_file)}
+    except (TypeError, ValueError) as error:
+        raise ResultsError(f"results {str(csv_file)!r}: a row without a seed") from error
+
+
+def _files_in(params: Mapping[str, Any]) -> tuple[list[Path], list[Path]]:
+    """The JSON files among parameters: results by their manifests, and what is no manifest."""
+    named = [Path(value) for value in params.values() if isinstance(value, str)]
+    files = [file for file in named if file.suffix == ".json" and file.is_file()]
+    known = [file for file in files if _is_manifest(file)]
+    return [f.with_suffix(".csv") for f in known], [f for f in files if f not in known]
+
+
+def _is_manifest(file: Path) -> bool:
+    """Whether a JSON file is the manifest of a batch."""
+    try:
+        data = json.loads(file.read_text(encoding="utf-8"))
+    except (OSError, ValueError):
+        return False
+    return isinstance(data, dict) and data.get("format") == FORMAT
+
+
+def fresh_seed(seed: int, runs: int, used: Collection[int]) -> int:
+    """The seed of a batch of so many episodes, none of which has a seed that was used.
+
+    The first of a sequence that starts from ``seed``. Raises InputError when there is none near,
+    which takes very many seeds.
+    """
+    taken = {number % SUMO_SEEDS for number in used}
+    for attempt in range(ATTEMPTS):
+        found = np.random.SeedSequence((seed, attempt)).generate_state(1, np.uint64)
+        batch_seed = int(found[0] >> np.uint64(1))  # the plan's seeds have 63 bits
+        if taken.isdisjoint(_sumo_seeds(batch_seed, runs)):
+            return batch_seed
+    raise InputError(f"no {runs} seeds beside {len(used)} that were used; try fewer --runs")
+
+
+def _sumo_seeds(batch_seed: int, runs: int) -> Iterator[int]:
+    """The seeds of a batch's episodes as SUMO takes them."""
+    return (episode_seed(batch_seed, i) % SUMO_SEEDS for i in range(runs))

@@ -1,0 +1,171 @@
+"""Many episodes over any executor, their outcomes in the order of their numbers.
+
+Whatever finishes first and wherever it was played, what comes out is the same. Episodes are
+independent of each other, but for agents that learn: those take their memory along from one of
+their episodes to the next, so they learn in sequence while the episodes of others fill the
+executor. What was learned can then be played in parallel (``learn=false``).
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from concurrent.futures import (
+    FIRST_COMPLETED,
+    BrokenExecutor,
+    CancelledError,
+    Executor,
+    Future,
+    wait,
+)
+from dataclasses import dataclass
+from itertools import groupby
+from typing import Any
+
+from cavsumo.agents.casting import learners
+from cavsumo.batch.jobs import Job, failed, job
+from cavsumo.batch.prepared import PreparedBatch
+from cavsumo.batch.worker import Answer, play
+from cavsumo.errors import BatchError, CavsumoError
+
+POLL_S = 0.2  # how often to look whether to stop, while nothing finishes
+
+
+def run_batch(
+    prepared: PreparedBatch,
+    executor: Executor,
+    todo: Iterable[int],
+    *,
+    memories: Mapping[str, Any] | None = None,
+    ahead: int = 16,
+    stopped: Callable[[], bool] = lambda: False,
+) -> Iterator[Answer]:
+    """The outcomes of a batch in the order of ``todo``, with what the agents know after each.
+
+    Closing the iterator gives up what has not come out yet.
+
+    Args:
+        executor: plays jobs by ``cavsumo.batch.worker.play``, in threads or in processes anywhere.
+        todo: numbers of episodes, ascending.
+        memories: what learning agents know already, by name.
+        ahead: how many episodes to have under way or waiting for their turn to come out.
+        stopped: asked all the time; once true, what runs is finished and nothing more is begun.
+    """
+    line = _Line(prepared, executor, todo, dict(memories or {}))
+    try:
+        while True:
+            if stopped():
+                line.call_off()
+            else:
+                line.join(ahead)
+            if not line.entries:
+                return
+            line.advance()
+            yield from line.ready()
+    finally:
+        line.call_off()
+
+
+@dataclass
+class _Entry:
+    """Episodes that are played together, between being asked for and coming out.
+
+    One episode, unless episodes share a simulation: then all of those, of which only ``wanted``
+    come out.
+    """
+
+    wanted: tuple[int, ...]
+    agent: str
+    future: Future[list[Answer]] | None = None
+    answers: list[Answer] | None = None
+
+
+class _Line:
+    """Episodes in the order in which they come out; each is submitted as soon as it can be."""
+
+    def __init__(
+        self,
+        prepared: PreparedBatch,
+        executor: Executor,
+        todo: Iterable[int],
+        memories: dict[str, Any],
+    ) -> None:
+        self.prepared, self.executor, self.memories = prepared, executor, memories
+        self._coming = self._grouped(todo)
+        self.entries: deque[_Entry] = deque()
+        self._learners = learners(prepared.plan)
+
+    def join(self, ahead: int) -> None:
+        """Take up episodes until so many are in line, and submit those that can start."""
+        while len(self.entries) < ahead and (entry := next(self._coming, None)) is not None:
+            self.entries.append(entry)
+        learning = set()
+        for entry in self.entries:
+            if entry.answers is None and entry.agent in self._learners:
+                if entry.agent in learning:
+                    continue  # its turn comes when it knows what the episode before teaches
+                learning.add(entry.agent)
+            if entry.future is None:
+                self._submit(entry)
+
+    def advance(self) -> None:
+        """Wait a moment for something to finish."""
+        waiting = [e for e in self.entries if e.future is not None and e.answers is None]
+        wait([e.future for e in waiting if e.future], POLL_S, return_when=FIRST_COMPLETED)
+        for entry in waiting:
+            if entry.future is not None and entry.future.done():
+                entry.answers = self._answers(entry, entry.future)
+                if entry.agent in self._learners:
+                    self.memories[entry.agent] = entry.answers[-1][1]
+
+    def ready(self) -> Iterator[Answer]:
+        """What can come out: all that is finished before the first that is not."""
+        while self.entries and (answers := self.entries[0].answers) is not None:
+            self.entries.popleft()
+            yield from answers
+
+    def call_off(self) -> None:
+        """Drop what has not started, and what would come out behind it."""
+        for place, entry in enumerate(self.entries):
+            if entry.answers is None and (entry.future is None or entry.future.cancel()):
+                for later in list(self.entries)[place:]:
+                    if later.future is not None:
+                        later.future.cancel()
+                while len(self.entries) > place:
+                    self.entries.pop()
+                return
+
+    def _grouped(self, runs: Iterable[int]) -> Iterator[_Entry]:
+        """Episodes that share a simulation together."""
+        block, agents = self.prepared.plan.block, tuple(self.prepared.plan.cast)
+        for _, group in groupby(runs, lambda run: run // block):
+            wanted = tuple(group)
+            yield _Entry(wanted, agents[wanted[0] % len(agents)])
+
+    def _jobs(self, entry: _Entry) -> list[Job]:
+        """The jobs of an entry, from the beginning of the simulation that they share."""
+        plan, last = self.prepared.plan, entry.wanted[-1]
+        memory = self.memories.get(entry.agent)
+        return [job(plan, run, memory) for run in range(last - last % plan.block, last + 1)]
+
+    def _submit(self, entry: _Entry) -> None:
+        """Hand an entry to the executor."""
+        try:
+            entry.future = self.executor.submit(play, self.prepared, self._jobs(entry))
+        except RuntimeError as error:  # as executors say that they are shut down or broken
+            raise BatchError(f"the executor takes no more episodes: {error}") from error
+
+    def _answers(self, entry: _Entry, future: Future[list[Answer]]) -> list[Answer]:
+        """The answers of an entry; what the executor lost are errors of its episodes."""
+        try:
+            answers = future.result()
+        except (CancelledError, BrokenExecutor, OSError) as error:
+            said = f"{type(error).__name__} {error}".strip()
+            raise BatchError(f"the executor is gone: {said}") from error
+        except CavsumoError:
+            raise
+        except Exception as error:  # such as dask's KilledWorker
+            said = f"the executor lost it: {type(error).__name__}: {error}"
+            plan = self.prepared.plan
+            answers = [(failed(plan, j, said, 0.0), j.memory) for j in self._jobs(entry)]
+        return [answer for answer in answers if answer[0].row["run"] in entry.wanted]

@@ -1,0 +1,71 @@
+"""One episode as a job: which it is, and its row when it fails.
+
+Imported by the parent process, so nothing here touches SUMO.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+from cavsumo.model.labels import labelled
+from cavsumo.model.scenario import BatchPlan, Simulation
+from cavsumo.model.seeds import episode_seed
+from cavsumo.results.rows import Outcome, Row
+
+
+@dataclass(frozen=True)
+class Job:
+    """One episode to play.
+
+    Attributes:
+        run: its number in the batch.
+        agent: the tester agent's label.
+        seed: the episode's seed.
+        memory: what the agents learned in earlier episodes, one entry an agent; None for none.
+        record: keep the frames whatever happens.
+        simulation: "own", or "new" to start one that later jobs share as the "same".
+    """
+
+    run: int
+    agent: str
+    seed: int
+    memory: tuple[Any, ...] | None = None
+    record: bool = False
+    simulation: Simulation = "own"
+
+
+def job(plan: BatchPlan, run: int, memory: tuple[Any, ...] | None = None) -> Job:
+    """The run-th episode of a batch: agents take turns, so run i stays what it is for any N.
+
+    ``memory``: what earlier episodes taught, unless the plan says what is known in all of them.
+    """
+    episode, which = divmod(run, len(plan.agents))
+    seed, label = episode_seed(plan.seed, episode), labelled(plan.agents[which])[0]
+    known = memory if plan.known is None else plan.known.get(label)
+    return Job(run, label, seed, known, plan.trace == "all")
+
+
+def failed_row(plan: BatchPlan, job: Job, message: str) -> Row:
+    """The row of an episode that could not be played."""
+    return head(plan, job) | {"outcome": "error", "error": message}
+
+
+def failed(plan: BatchPlan, job: Job, message: str, wall: float) -> Outcome:
+    """The outcome of an episode that could not be played."""
+    return Outcome(failed_row(plan, job, message) | {"wall_s": wall})
+
+
+def head(plan: BatchPlan, job: Job) -> Row:
+    """The columns that are known beforehand."""
+    scenario = plan.scenario
+    return {
+        "run": job.run,
+        "agent": job.agent,
+        "ego": scenario.ego,
+        "testers": scenario.testers,
+        "reset": "fresh" if job.simulation == "own" else "shared",
+        "embodiment": scenario.embodiment,
+        "sumo_width_m": scenario.sumo_width,
+        "seed": job.seed,
+    }

@@ -1,0 +1,118 @@
+"""Shards put together: the results file that a single run would have written."""
+
+from __future__ import annotations
+
+import heapq
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from typing import Any
+
+from cavsumo.batch.replay import recorded_plan
+from cavsumo.batch.summary import Ended
+from cavsumo.batch.tally import Tally
+from cavsumo.errors import ResultsError
+from cavsumo.results.provenance import differences
+from cavsumo.results.reading import ego_log_name, whole_lines
+from cavsumo.results.rows import Outcome
+from cavsumo.results.writing import Recorder
+
+SHOWN = 5  # missing episodes that are named
+APART = frozenset({"shard", "deadline_s", "budget_s"})  # settings in which parts may differ
+Numbered = tuple[int, int, dict[str, str]]  # run, which part, row
+
+
+def merged(parts: Sequence[Path], output: Path, *, overwrite: bool) -> Ended:
+    """Check that the parts make a whole, then write it; raises ResultsError if they do not."""
+    if output.resolve() in [part.resolve() for part in parts]:
+        raise ResultsError(f"output {str(output)!r}: is one of the parts")
+    whole = _whole_manifest(parts)
+    _check_whole(parts, whole)
+    tally = Tally()
+    with Recorder(output) as recorder:
+        recorder.begin(whole, overwrite=overwrite)
+        for run, part, row in _in_order(parts):
+            files = _trace_of(parts[part], row), _log_of(parts[part], run)
+            tally.add(recorder.write(Outcome(row | {"run": run}, *files)))
+        facts = {"episodes": tally.rows, "counts": tally.all.outcomes}
+        recorder.finish("finished", facts)
+    return Ended("", output, tally, recorder.traces)
+
+
+def _whole_manifest(parts: Sequence[Path]) -> dict[str, Any]:
+    """The manifest of the whole; the parts must be of one batch."""
+    first: dict[str, Any] | None = None
+    for part in parts:
+        _, manifest = recorded_plan(part)
+        if first is None:
+            first = manifest
+        different = list(differences(first, manifest, apart=APART))
+        if different:
+            raise ResultsError(
+                f"{str(part)!r} and {str(parts[0])!r} are of different batches: "
+                + "; ".join(different)
+            )
+    assert first is not None
+    kept = {"command", "ego_route", "junction", "sha256", "versions", "sumo_options"}
+    plan = dict(first["plan"]) | {"shard": None}
+    return {key: first[key] for key in first if key in kept} | {
+        "plan": plan,
+        "merged_from": [str(part) for part in parts],
+    }
+
+
+def _check_whole(parts: Sequence[Path], whole: dict[str, Any]) -> None:
+    """Every episode must be there, once."""
+    total = whole["plan"]["runs"] * len(whole["plan"]["agents"])
+    missing: list[int] = []
+    expected = owner = 0
+    for run, part, row in _in_order(parts):
+        if run < expected:
+            there = " and in ".join(repr(str(parts[i])) for i in sorted({owner, part}))
+            raise ResultsError(f"run {run} is there twice, in {there}")
+        if run >= total:
+            raise ResultsError(f"{str(parts[part])!r}: run {run} of a batch of {total} episodes")
+        missing += range(expected, min(run, expected + SHOWN))
+        _trace_of(parts[part], row)
+        _log_of(parts[part], run)
+        expected, owner = run + 1, part
+    missing += range(expected, min(total, expected + SHOWN))
+    if missing:
+        some = ", ".join(map(str, missing[:SHOWN]))
+        more = ", ..." if len(missing) > SHOWN else ""
+        raise ResultsError(f"the parts have gaps: no run {some}{more} of {total} episodes")
+
+
+def _in_order(parts: Sequence[Path]) -> Iterator[Numbered]:
+    """The rows of all parts by their numbers."""
+    return heapq.merge(*(_numbered(part, i) for i, part in enumerate(parts)), key=lambda n: n[:2])
+
+
+def _numbered(part: Path, index: int) -> Iterator[Numbered]:
+    """The rows of one part, which must ascend."""
+    last = -1
+    for _, row in whole_lines(part):
+        if row is not None:
+            run = int(row["run"])
+            if run <= last:
+                raise ResultsError(f"results {str(part)!r}: run {run} stands behind run {last}")
+            last = run
+            yield run, index, row
+
+
+def _trace_of(part: Path, row: dict[str, str]) -> str:
+    """The trace of a row, empty for none."""
+    if not row["trace"]:
+        return ""
+    try:
+        return (part.parent / row["trace"]).read_text(encoding="utf-8")
+    except (OSError, UnicodeDecodeError) as error:
+        raise ResultsError(f"results {str(part)!r}: trace of run {row['run']}: {error}") from error
+
+
+def _log_of(part: Path, run: int) -> str:
+    """What the ego printed in an episode, empty for nothing."""
+    file = part.parent / ego_log_name(part, run)
+    try:
+        return file.read_text(encoding="utf-8") if file.exists() else ""
+    except (OSError, UnicodeDecodeError) as error:
+        raise ResultsError(f"results {str(part)!r}: {file.name}: {error}") from error

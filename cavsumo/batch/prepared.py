@@ -1,0 +1,156 @@
+"""A plan that was checked, with all that a process needs to play it, and what identifies it."""
+
+from __future__ import annotations
+
+import hashlib
+import math
+import sys
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from cavsumo.agents.casting import check_agents, learners, make_agents
+from cavsumo.agents.manoeuvres import types_for
+from cavsumo.assertions import make_assertions
+from cavsumo.egos import make_ego
+from cavsumo.egos.base import Ego
+from cavsumo.errors import InputError
+from cavsumo.model.bodies import WALKING, Kind, kind_named
+from cavsumo.model.scenario import BatchPlan
+from cavsumo.network.site import Site, Wishes, derive_site
+from cavsumo.network.traffic import Volume
+from cavsumo.network.traffic_lights import Pace
+from cavsumo.results.provenance import checksums, traffic_checksum, unequal, versions
+from cavsumo.sumo.demand import BEYOND_S
+from cavsumo.sumo.options import OPTIONS
+
+
+@dataclass(frozen=True)
+class PreparedBatch:
+    """What a process needs to play the jobs of a batch.
+
+    Attributes:
+        plan, site: what is played, and where.
+        folder: the working folder that the plan's files are relative to.
+        checksums: of the plan's files, so that a process elsewhere notices other ones.
+        versions: of what the results depend on.
+        key: stands for all of it.
+    """
+
+    plan: BatchPlan
+    site: Site
+    folder: str
+    checksums: Mapping[str, str]
+    versions: Mapping[str, str]
+    key: str = field(init=False)
+
+    def __post_init__(self) -> None:
+        facts = (self.plan.model_dump_json(), self.folder, self.checksums, self.versions)
+        object.__setattr__(self, "key", hashlib.sha256(repr(facts).encode()).hexdigest())
+
+    def check_here(self) -> None:
+        """Raise InputError unless this process sees the same files and versions."""
+        pairs = {**self.versions, **self.checksums}, {**versions(), **checksums(self.plan)}
+        for name, (there, here) in unequal(*pairs):
+            raise InputError(f"{name} is {here} in the process that simulates, expected {there}")
+
+
+def prepare(plan: BatchPlan, ego: Ego | None = None) -> PreparedBatch:
+    """Check every name and parameter of a plan and derive its site; raises InputError.
+
+    ``ego`` drives instead of the one that the plan names.
+    """
+    scenario = plan.scenario
+    check_agents(plan)
+    for label in plan.cast:
+        make_agents(plan, label)[0].prepare()
+    make_assertions(
+        scenario.assertions, scenario.assertion_params, scenario.formulas, scenario.step_length
+    )
+    kind = kind_named(scenario.kind)
+    _check_kind(plan, kind)
+    if learners(plan) and (plan.shard or plan.reset == "shared"):
+        what = f"shard {plan.shard}" if plan.shard else "reset shared"
+        raise InputError(
+            f"{what}: {' and '.join(sorted(learners(plan)))} learns from episode to episode, in "
+            "sequence; learn=false plays what was learned"
+        )
+    ego = ego or make_ego(scenario.ego, scenario.ego_params)
+    if scenario.ego_sensor and type(ego).act is Ego.act:
+        raise InputError(
+            f"ego_sensor: ego {scenario.ego} is driven by SUMO, which sees everybody; a sensor "
+            "needs a controller, such as time-gap"
+        )
+    site = derive_site(
+        scenario.net, scenario.ego_route, scenario.junction, ego.kind, wishes(plan, kind, ego)
+    )
+    if scenario.embodiment == "person" and not all(area.walk for area in site.areas):
+        raise InputError("jaywalk: embodiment person needs a pavement near by, and there is none")
+    if site.approaches:  # that there is room for them must not come out an episode at a time
+        kinds, rng = [kind] * scenario.testers, np.random.default_rng(plan.seed)
+        site.draw(kinds, ego.kind, scenario.start_speed, rng)
+    return PreparedBatch(plan, site, str(Path.cwd()), checksums(plan), versions())
+
+
+def wishes(plan: BatchPlan, kind: Kind, ego: Ego) -> Wishes:
+    """What a plan asks of its site besides the route."""
+    scenario = plan.scenario
+    volume = None
+    if scenario.traffic is not None:
+        seed = plan.seed if scenario.traffic_seed is None else scenario.traffic_seed
+        volume = Volume(*scenario.traffic, duration=scenario.end + BEYOND_S, seed=seed)
+    return Wishes(
+        kind=kind,
+        types=scenario.approaches or _types(plan),
+        jaywalk=scenario.jaywalk,
+        volume=volume,
+        signal=scenario.signal,
+        pace=Pace(ego.depart_speed, _top_speed(ego)),
+    )
+
+
+def _top_speed(ego: Ego) -> float:
+    """The speed that an ego never exceeds [m/s]; what is no number SUMO will refuse."""
+    try:
+        return min(ego.kind.v_max, float(ego.vtype().get("maxSpeed", math.inf)))
+    except ValueError:
+        return ego.kind.v_max
+
+
+def _check_kind(plan: BatchPlan, kind: Kind) -> None:
+    """Refuse what walkers or vehicles cannot do."""
+    if plan.scenario.jaywalk and kind.name not in WALKING:
+        raise InputError(f"jaywalk: only {' and '.join(WALKING)}s start beside the road")
+    if kind.name in WALKING:
+        if plan.scenario.approaches:
+            raise InputError(f"kind {kind.name!r}: only vehicles have approaches; name a --kind")
+        return
+    for label in plan.cast:
+        if not all(agent.drives for agent in make_agents(plan, label)):
+            raise InputError(
+                f"kind {kind.name!r}: agent {label} can only walk; choose another agent or kind "
+                f"{' or '.join(WALKING)}"
+            )
+
+
+def _types(plan: BatchPlan) -> tuple[str, ...]:
+    """The types of approach on which all agents can do the one manoeuvre asked of them."""
+    agents = [agent for label in plan.cast for agent in make_agents(plan, label)]
+    names = {getattr(agent, "manoeuvre", "auto") for agent in agents}
+    return types_for(names.pop()) if len(names) == 1 else ()
+
+
+def manifest(prepared: PreparedBatch) -> dict[str, Any]:
+    """What makes a batch reproducible."""
+    return {
+        "command": ["cavsumo", *sys.argv[1:]],
+        "plan": prepared.plan.model_dump(mode="json"),
+        "ego_route": list(prepared.site.route.edges),
+        "junction": prepared.site.route.junction,
+        "sha256": dict(prepared.checksums) | traffic_checksum(prepared.site),
+        "versions": dict(prepared.versions),
+        "sumo_options": dict(OPTIONS),
+    }

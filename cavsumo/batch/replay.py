@@ -1,0 +1,254 @@
+"""Recorded episodes: found in results or alone in a trace, played again, compared bit for bit."""
+
+from __future__ import annotations
+
+import dataclasses
+import shlex
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from cavsumo.agents.casting import learners
+from cavsumo.batch.jobs import Job, job
+from cavsumo.batch.worker import Worker, search
+from cavsumo.errors import DivergenceError, InputError, ResultsError
+from cavsumo.model.scenario import BatchPlan, Scenario
+from cavsumo.results.columns import COLUMNS
+from cavsumo.results.provenance import checksum
+from cavsumo.results.reading import STARTING, read_manifest, read_rows
+from cavsumo.results.rows import Outcome, Row, cell
+from cavsumo.results.traces import NOT_REPLAYED, Trace, read_trace
+
+
+@dataclass(frozen=True)
+class Record:
+    """An episode as it was recorded.
+
+    Attributes:
+        plan: of its batch.
+        row: the episode's row, as text.
+        trace: its trace, None when none was kept.
+        origin: the batch's manifest, or the trace's head: versions and checksums.
+        file: where it was found.
+        alone: whether that is a trace, without the episodes before it.
+    """
+
+    plan: BatchPlan
+    row: Mapping[str, str]
+    trace: Trace | None
+    origin: Mapping[str, Any]
+    file: Path
+    alone: bool = False
+
+    @property
+    def run(self) -> int:
+        """The number of the episode in its batch."""
+        return int(self.row["run"])
+
+    @property
+    def command(self) -> str:
+        """What plays it again."""
+        return f"cavsumo replay {shlex.quote(self.file.name)}" + (
+            "" if self.alone else f" {self.run}"
+        )
+
+
+class Difference(NamedTuple):
+    """Where a replay first departs from the record; see ``DivergenceError``."""
+
+    place: str
+    what: str
+    step: int | None
+    body: str = ""
+    quantity: str = ""
+
+
+# Found
+
+
+def recorded(csv_file: Path, run: int) -> Record:
+    """An episode of a batch."""
+    plan, manifest = recorded_plan(csv_file)
+    row = recorded_row(csv_file, run)
+    trace = read_trace(csv_file.parent / row["trace"]) if row.get("trace") else None
+    return Record(plan, row, trace, manifest, csv_file)
+
+
+def recorded_plan(csv_file: Path) -> tuple[BatchPlan, dict[str, Any]]:
+    """The plan of a batch, and its manifest."""
+    manifest = read_manifest(csv_file)
+    if manifest.get("status") == STARTING:
+        raise ResultsError(f"results {str(csv_file)!r}: a batch that was killed as it started")
+    try:
+        return BatchPlan.model_validate(manifest["plan"]), manifest
+    except (KeyError, ValueError) as error:
+        raise ResultsError(f"manifest of {str(csv_file)!r}: holds no valid plan") from error
+
+
+def recorded_row(csv_file: Path, run: int) -> dict[str, str]:
+    """The row of an episode."""
+    rows = {row.get("run"): row for row in read_rows(csv_file)}
+    if str(run) not in rows:
+        raise ResultsError(f"results {str(csv_file)!r}: no run {run} among {len(rows)} rows")
+    return rows[str(run)]
+
+
+def recorded_alone(file: Path) -> Record:
+    """The episode in a trace; raises ResultsError when it cannot be played from that alone."""
+    trace, name = read_trace(file), f"trace {str(file)!r}"
+    head = trace.head
+    try:
+        plan = BatchPlan.model_validate(head["plan"])
+        row = trace.row
+        int(row["run"]), int(row["seed"]), trace.shapes(), dict(head["sha256"])
+        plan.agents.index(row["agent"])
+        kept, shared = head["memory_kept"], row["reset"] == "shared"
+    except (KeyError, ValueError, TypeError) as error:
+        raise ResultsError(f"{name}: its head holds no valid plan, row and bodies") from error
+    if shared:
+        raise ResultsError(
+            f"{name}: was played in a simulation that other episodes used before; replay it from "
+            "its results"
+        )
+    if not kept:
+        raise ResultsError(
+            f"{name}: does not hold what agent {row['agent']} had learned before, which is large; "
+            "replay it from its results"
+        )
+    return Record(plan, row, trace, head, file, alone=True)
+
+
+def located(record: Record, net: Path | None, routes: Path | None) -> Record:
+    """The record with its files where they are here, known by their checksums.
+
+    Each is looked for where it is said to be, else where it was recorded and beside the trace.
+    Raises InputError when it is nowhere, or another one.
+    """
+    scenario = record.plan.scenario
+    here = {"net": _file(record, "--net", scenario.net, net)}
+    if scenario.routes is not None:
+        here["routes"] = _file(record, "--routes", scenario.routes, routes)
+    more = tuple(_file(record, "additional", file, None) for file in scenario.additional)
+    moved = scenario.model_copy(update={**here, "additional": more})
+    known = dict(record.origin.get("sha256") or {})
+    for was, now in zip(_files(scenario), _files(moved), strict=True):
+        known[str(now)] = known.pop(str(was))
+    return dataclasses.replace(
+        record,
+        plan=record.plan.model_copy(update={"scenario": moved}),
+        origin={**record.origin, "sha256": known},
+    )
+
+
+def _files(scenario: Scenario) -> list[Path]:
+    """The files that are looked for."""
+    return [f for f in (scenario.net, scenario.routes, *scenario.additional) if f is not None]
+
+
+def _file(record: Record, option: str, was: Path, given: Path | None) -> Path:
+    """Where a file of a plan is."""
+    expected = dict(record.origin.get("sha256") or {}).get(str(was))
+    places = [given] if given else [was, record.file.parent / was.name]
+    there = [file for file in places if file.is_file()]
+    for file in there:
+        if checksum(file) == expected:
+            return file
+    what = f"{was.name!r} (sha256 {str(expected)[:12]})"
+    if there:
+        raise InputError(
+            f"{option} {str(there[0])!r}: sha256 {checksum(there[0])[:12]}, not the {what} of "
+            f"{str(record.file)!r}"
+        )
+    if given:
+        raise InputError(f"{option}: no such file: {str(given)!r}")
+    how = f"name it with {option} FILE or put it" if option.startswith("--") else "put it"
+    raise InputError(f"{str(record.file)!r} needs {what}, which is not here; {how} beside it")
+
+
+# Played again
+
+
+def replayed(worker: Worker, record: Record) -> Outcome:
+    """An episode once more, with all that came before it and matters to it.
+
+    Learners first live through their earlier episodes, or are told what they knew if a trace
+    stands alone; an episode of a shared simulation comes after those before it.
+    """
+    plan, run = worker.prepared.plan, record.run
+    if record.alone and record.trace is not None:
+        row, memory = record.row, record.trace.head["memory"]
+        again = Job(run, row["agent"], int(row["seed"]), memory, record=True)
+        return worker.play(again)[0]
+    if record.row["reset"] == "shared":
+        first = run - run % plan.block
+        return search(worker, [job(plan, i) for i in range(first, run + 1)])[-1][0]
+    return worker.play(dataclasses.replace(job(plan, run, known(worker, run)), record=True))[0]
+
+
+def known(worker: Worker, run: int) -> tuple[Any, ...] | None:
+    """What the agents of an episode knew before it; a learner lives through its earlier ones."""
+    plan, memory = worker.prepared.plan, job(worker.prepared.plan, run).memory
+    step = len(plan.agents)
+    learns = job(plan, run).agent in learners(plan)
+    for earlier in range(run % step, run, step) if learns else ():
+        _, memory = worker.play(job(plan, earlier, memory))
+    return memory
+
+
+# Compared
+
+
+def compare(record: Record, again: Outcome) -> None:
+    """Raise DivergenceError at the first difference of a replay from its record."""
+    name = f"run {record.run} ({record.row['agent']})"
+    if again.row["outcome"] == "error" != record.row["outcome"]:
+        said = f"{name} could not be played again: {again.row['error']}"
+        raise DivergenceError(said, None, "", "outcome")
+    frames = record.trace.frames if record.trace is not None else None
+    found = first_difference(record.row, frames, again.row, again.frames)
+    if found is not None:
+        place, what, step, body, quantity = found
+        raise DivergenceError(f"{name} diverged at {place}: {what}", step, body, quantity)
+
+
+def first_difference(
+    row: Mapping[str, str],
+    frames: Sequence[Mapping[str, Any]] | None,
+    again: Row,
+    frames_again: Sequence[Mapping[str, Any]],
+) -> Difference | None:
+    """Where a replay departs from the record: the timestep, the body and the quantity."""
+    if frames is not None:
+        for old, new in zip(frames, frames_again, strict=False):
+            for difference in _frame_differences(old, new):
+                return difference
+        if len(frames) != len(frames_again):
+            end = min(len(frames), len(frames_again))
+            what = f"{len(frames)} frames were recorded, {len(frames_again)} replayed"
+            return Difference("the end of the trace", what, end, quantity="frames")
+    for column in COLUMNS:
+        if column not in NOT_REPLAYED and row.get(column, "") != cell(again.get(column)):
+            what = f"recorded {row.get(column)!r}, replayed {cell(again.get(column))!r}"
+            return Difference("the row", f"{column} {what}", None, quantity=column)
+    return None
+
+
+def _frame_differences(old: Mapping[str, Any], new: Mapping[str, Any]) -> Iterator[Difference]:
+    """The differences of two frames, body by body."""
+    step = old["step"]
+    place = f"step {step} ({old['time_s']:.3f} s)"
+    for key in ("step", "time_s", "steering", "lights"):
+        if old.get(key) != new.get(key):
+            what = f"{key} recorded {old.get(key)!r}, replayed {new.get(key)!r}"
+            yield Difference(place, what, step, quantity=key)
+    old_bodies = {"ego": old["ego"], **old["testers"], **old["background"]}
+    new_bodies = {"ego": new["ego"], **new["testers"], **new["background"]}
+    for body in sorted(old_bodies.keys() ^ new_bodies.keys()):
+        what = f"{body} is {'gone' if body in old_bodies else 'new'}"
+        yield Difference(place, what, step, body)
+    for body, state in old_bodies.items():
+        for name, a, b in zip("xyvo", state, new_bodies.get(body, state), strict=True):
+            if a != b:
+                what = f"{body}.{name} recorded {a!r}, replayed {b!r}"
+                yield Difference(place, what, step, body, name)

@@ -1,0 +1,280 @@
+"""A process that simulates, seen from outside: given jobs, watched, ended, replaced.
+
+SUMO can end its whole process (segmentation fault) or never come back (endless loop). So whoever
+wants an episode played waits on a pipe with a deadline, and a crash or a hang costs one row.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import dataclasses
+import os
+import signal
+import socket
+import struct
+import subprocess
+import sys
+import tempfile
+import threading
+import time
+from collections.abc import Sequence
+from multiprocessing import Pipe
+from multiprocessing.connection import Connection
+from typing import Any
+
+from cavsumo.batch.jobs import Job, failed
+from cavsumo.batch.prepared import PreparedBatch
+from cavsumo.batch.worker_process import GOES_ON, GOODBYE
+from cavsumo.errors import BatchError, InputError
+from cavsumo.model.processes import ending, inner_environment
+from cavsumo.model.scenario import Simulation
+from cavsumo.results.rows import Outcome, is_test
+
+STARTUP_S = 120.0  # imports, SUMO's first start and that of the ego, on a slow machine
+STUCK_S = 20  # how long a message may stop half-way
+DISMISSAL_S = 3.0  # how long a process may take to end by itself
+ATTEMPTS = 5  # to start a process that dies while it starts
+LIFETIME = 10_000  # episodes that one process plays; SUMO leaks a little with every restart
+Answer = tuple[Outcome, Any]  # an outcome, and what the agents know afterwards
+
+
+class Worker:
+    """A process with one SUMO in it, replaced when it dies; a context manager."""
+
+    def __init__(self, prepared: PreparedBatch) -> None:
+        self.prepared = prepared
+        self._process: subprocess.Popen[bytes] | None = None
+        self._busy = threading.Lock()
+        self._played = 0
+        self.closed = False
+
+    def __enter__(self) -> Worker:
+        self.start()
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+    def start(self) -> None:
+        """Start the process; raises InputError when it refuses the batch."""
+        with self._busy:
+            self._start(strict=True)
+
+    def play(self, job: Job) -> Answer:
+        """The outcome of a job and the agents' memory after it; a crash is an outcome too.
+
+        Raises BatchError when no process can be started any more.
+        """
+        begun = time.perf_counter()
+        with self._busy:
+            if self._played >= LIFETIME:
+                self._stop()
+            try:
+                return self._ask(job)
+            except _ProcessGone as gone:
+                self._stop()
+                wall = time.perf_counter() - begun
+                return failed(self.prepared.plan, job, str(gone), wall), job.memory
+
+    def close(self) -> None:
+        """End the process for good: in peace, or at once while another thread waits for it."""
+        self.closed = True
+        if self._busy.acquire(blocking=False):
+            self._dismiss()
+            self._busy.release()
+        elif self._process is not None:
+            _kill(self._process)
+        with self._busy:
+            self._stop()
+        _WORKERS.discard(self)
+
+    def _start(self, *, strict: bool) -> None:
+        """Start the process and wait until it can play; nothing to do if it runs.
+
+        Strict, an ego that cannot be started is a reason to refuse.
+        """
+        for _ in range(ATTEMPTS):
+            if self._process is not None:
+                return
+            self._launch(strict)
+            try:
+                refusal = self._receive(STARTUP_S)
+            except _ProcessGone as gone:
+                self._stop()
+                refusal = f"the simulation cannot be started: {gone}"
+            else:
+                if refusal is None:
+                    return
+                break  # it said no, and would again
+        self._stop()
+        raise InputError(refusal)
+
+    def _ask(self, job: Job) -> Answer:
+        """Have a job played, by a new process if the old one is no more."""
+        for _ in range(ATTEMPTS):
+            try:
+                self._start(strict=False)
+            except InputError as error:  # it could be started when the batch began
+                raise BatchError(f"no process to simulate in: {error}") from error
+            try:
+                self._pipe.send(job)
+            except OSError:  # it died while it waited: the job has not begun
+                self._stop()
+                continue
+            answer: Answer | str = GOES_ON
+            while answer == GOES_ON:  # each simulation has the whole deadline
+                answer = self._receive(self.prepared.plan.deadline_s)
+            if not isinstance(answer, str):
+                self._played += 1
+                return answer
+            assert answer == GOODBYE
+            self._stop()
+        raise _ProcessGone("the simulation process died again and again while it waited")
+
+    def _launch(self, strict: bool) -> None:
+        """Start the process and hand over the batch."""
+        if self.closed:
+            raise BatchError("the batch is over")
+        self._played = 0
+        self._folder = tempfile.TemporaryDirectory(prefix="cavsumo-worker-")
+        self._log = tempfile.TemporaryFile()  # noqa: SIM115  # lives as long as the process
+        self._pipe, theirs = Pipe()
+        _limit(self._pipe)
+        fds = theirs.fileno(), self._log.fileno()
+        numbers = (*fds, os.getpid())
+        # what a killed process leaves goes with this folder
+        environment = inner_environment() | {"TMPDIR": self._folder.name}
+        _WORKERS.add(self)
+        try:
+            self._process = subprocess.Popen(
+                [sys.executable, "-P", "-m", "cavsumo.batch.worker_process", *map(str, numbers)],
+                pass_fds=fds,
+                cwd=self.prepared.folder,
+                env=environment,
+                stdin=subprocess.DEVNULL,
+                process_group=0,  # Ctrl-C is for the parent; and all of it can be killed
+            )
+        except OSError as error:
+            raise InputError(
+                f"cannot start a process in {self.prepared.folder!r}: {error}"
+            ) from error
+        finally:
+            theirs.close()  # so that its death is seen as the end of the pipe
+        if self.closed:  # by another thread, which saw no process yet
+            _kill(self._process)
+        with contextlib.suppress(OSError):  # it died already, as _receive will find
+            self._pipe.send((self.prepared, strict))
+
+    def _receive(self, deadline: float) -> Any:
+        """What the process sends, or _ProcessGone when it died or took too long."""
+        try:
+            if self._pipe.poll(deadline):
+                return self._pipe.recv()
+        except BlockingIOError:  # it began to answer
+            raise _ProcessGone(f"stuck in its answer for {STUCK_S} s, killed") from None
+        except (EOFError, OSError):
+            raise _ProcessGone(self._end() + self._last_words()) from None
+        raise _ProcessGone(f"no answer within {deadline:g} s, killed")
+
+    def _end(self) -> str:
+        """How the process ended, in words."""
+        assert self._process is not None
+        try:
+            code = self._process.wait(5.0)
+        except subprocess.TimeoutExpired:
+            return "the simulation process closed its pipe, killed"
+        return f"the simulation process {ending(code)}"
+
+    def _last_words(self) -> str:
+        """The last line that the process printed below Python."""
+        self._log.seek(0)
+        text = self._log.read().decode("utf-8", errors="replace")
+        lines = [line.strip() for line in text.splitlines() if line.strip()]
+        return f" ({lines[-1]})" if lines else ""
+
+    def _dismiss(self) -> None:
+        """Let a process that waits for a job end by itself, and so its ego."""
+        if self._process is not None:
+            self._pipe.close()
+            with contextlib.suppress(subprocess.TimeoutExpired):
+                self._process.wait(DISMISSAL_S)
+
+    def _stop(self) -> None:
+        """End the process and what belongs to it."""
+        if self._process is None:
+            return
+        _kill(self._process)
+        self._process = None
+        self._pipe.close()
+        self._log.close()
+        self._folder.cleanup()
+
+
+class _ProcessGone(Exception):
+    """The process died or was killed; the message says how."""
+
+
+def _limit(pipe: Connection) -> None:
+    """Let neither a send nor the rest of an answer wait for a stopped process for ever."""
+    with socket.socket(fileno=os.dup(pipe.fileno())) as end:
+        for option in (socket.SO_RCVTIMEO, socket.SO_SNDTIMEO):
+            end.setsockopt(socket.SOL_SOCKET, option, struct.pack("ll", STUCK_S, 0))
+
+
+def _kill(process: subprocess.Popen[bytes]) -> None:
+    """Kill a process and its children, stopped ones too, and wait for its end."""
+    with contextlib.suppress(ProcessLookupError):
+        os.killpg(process.pid, signal.SIGKILL)
+    process.wait(10.0)
+
+
+# The workers of this process, one for each thread that plays.
+
+_WORKERS: set[Worker] = set()
+_THREAD = threading.local()
+
+
+def play(prepared: PreparedBatch, jobs: Sequence[Job]) -> list[Answer]:
+    """Play jobs in a process of this thread's own: what every executor is given to do.
+
+    Several jobs share one simulation. What they find there is played again, each in a simulation
+    of its own, and that is what counts.
+    """
+    worker = _own_worker(prepared)
+    if prepared.plan.reset == "fresh":
+        return [worker.play(job) for job in jobs]
+    return [
+        worker.play(job) if is_test(answer[0].row) else answer
+        for job, answer in zip(jobs, search(worker, jobs), strict=True)
+    ]
+
+
+def search(worker: Worker, jobs: Sequence[Job]) -> list[Answer]:
+    """Play jobs one after another in one simulation; behind an error, in a new one."""
+    answers: list[Answer] = []
+    for job in jobs:
+        goes_on = bool(answers) and answers[-1][0].row["outcome"] != "error"
+        simulation: Simulation = "same" if goes_on else "new"
+        answers.append(worker.play(dataclasses.replace(job, simulation=simulation)))
+    return answers
+
+
+def try_out(prepared: PreparedBatch) -> None:
+    """Start this thread's process; raises InputError when it refuses the batch."""
+    _own_worker(prepared).start()
+
+
+def close_all() -> None:
+    """End all processes that threads of this process have started."""
+    for worker in list(_WORKERS):
+        worker.close()
+
+
+def _own_worker(prepared: PreparedBatch) -> Worker:
+    """This thread's worker, a new one for another batch."""
+    worker: Worker | None = getattr(_THREAD, "worker", None)
+    if worker is None or worker.closed or worker.prepared.key != prepared.key:
+        if worker is not None:
+            worker.close()
+        worker = _THREAD.worker = Worker(prepared)
+    return worker

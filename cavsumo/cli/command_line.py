@@ -1,0 +1,96 @@
+"""The command ``cavsumo``: parses its options and calls a command; errors become exit statuses."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from collections.abc import Sequence
+from typing import NoReturn
+
+from cavsumo import __version__
+from cavsumo.cli.options.certify import add_certify
+from cavsumo.cli.options.check_ego import add_check_ego
+from cavsumo.cli.options.game import add_game
+from cavsumo.cli.options.networks import add_import_osm, add_inspect
+from cavsumo.cli.options.results import add_merge, add_replay, add_report
+from cavsumo.cli.options.run import add_run
+from cavsumo.errors import BatchError, CavsumoError, DivergenceError, Exit, InputError
+
+HYPHENATED = ("--bbox", "--ego-route", "--junction")  # options whose values may begin with "-"
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """The command ``cavsumo``; returns the exit status."""
+    try:
+        words = sys.argv[1:] if argv is None else argv
+        options = _parser().parse_args(_joined(words))
+        status: int = options.command(options)
+        return status
+    except DivergenceError as error:
+        print(f"cavsumo: {error}", file=sys.stderr)
+        return Exit.VIOLATED
+    except CavsumoError as error:
+        print(f"cavsumo: {error}", file=sys.stderr)
+        return Exit.NOT_RUN if isinstance(error, BatchError) else Exit.USAGE
+    except BrokenPipeError:
+        return Exit.OK
+    except KeyboardInterrupt:
+        return Exit.INTERRUPTED
+
+
+def _joined(words: Sequence[str]) -> list[str]:
+    """The words, with a value that begins with a hyphen tied to its option by "=".
+
+    Western longitudes and SUMO's edges against the direction begin with one, and argparse would
+    take them for options.
+    """
+    joined: list[str] = []
+    for word in words:
+        if joined and joined[-1] in HYPHENATED and word[:1] == "-" and word[:2] != "--":
+            joined[-1] += f"={word}"
+        else:
+            joined.append(word)
+    return joined
+
+
+class _OptionParser(argparse.ArgumentParser):
+    """argparse with our way of saying no: one sentence, exit status 2."""
+
+    def error(self, message: str) -> NoReturn:
+        raise InputError(f"{message} (see {self.prog} --help)")
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = _OptionParser(
+        prog="cavsumo",
+        description="Which tests make this vehicle fail at this junction, are they fair, and how "
+        "sure are we? Generates tests for autonomous vehicles in SUMO.",
+        allow_abbrev=False,
+    )
+    parser.add_argument("--version", action="version", version=f"cavsumo {__version__}")
+    commands = parser.add_subparsers(title="commands", required=True, metavar="COMMAND")
+    add_run(commands)
+    add_replay(commands)
+    add_report(commands)
+    add_merge(commands)
+    add_certify(commands)
+    add_check_ego(commands)
+    add_inspect(commands)
+    add_import_osm(commands)
+    add_game(commands)
+    for sort, text in (
+        ("agents", "list the tester agents"),
+        ("egos", "list the vehicles under test"),
+        ("assertions", "list what can be asserted"),
+    ):
+        listing = commands.add_parser(sort, help=text, description=text, allow_abbrev=False)
+        listing.add_argument("name", nargs="?", help="show the parameters of this one")
+        listing.set_defaults(command=_list, sort=sort)
+    return parser
+
+
+def _list(options: argparse.Namespace) -> int:
+    from cavsumo.cli.listings import listing
+
+    print(listing(options.sort, options.name))
+    return Exit.OK

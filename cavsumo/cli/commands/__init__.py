@@ -1,0 +1,1 @@
+"""What each command does, one file a command; heavy to import, so only when it is called."""

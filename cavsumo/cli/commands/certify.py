@@ -1,0 +1,264 @@
+"""``cavsumo certify``: a test over fresh seeds and a list of egos, and what that proves."""
+
+from __future__ import annotations
+
+import contextlib
+import dataclasses
+import json
+import sys
+import tempfile
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from rich.console import Console
+
+from cavsumo.agents.policy import policy_file
+from cavsumo.batch.certify.certificate import (
+    TriggerCertificate,
+    as_json,
+    as_table,
+    certified,
+    sentences,
+)
+from cavsumo.batch.certify.ego_list import Egos, choices, opponents
+from cavsumo.batch.certify.tested_policy import Subject, of_policy, of_run, settings_of
+from cavsumo.batch.certify.used_seeds import Used, fresh_seed, used
+from cavsumo.batch.executors import Means
+from cavsumo.batch.preflight import CheckedBatch, Manner, checked
+from cavsumo.batch.prepared import PreparedBatch, prepare
+from cavsumo.batch.replay import Record, recorded, recorded_plan
+from cavsumo.cli.commands.run import exit_status, played
+from cavsumo.egos import make_ego
+from cavsumo.errors import Exit, InputError
+from cavsumo.model.bodies import kind_named
+from cavsumo.model.labels import labelled
+from cavsumo.model.scenario import BatchPlan, Params
+from cavsumo.model.seeds import starts_generator
+from cavsumo.model.study import Part, product
+
+FORMAT = 1  # of the JSON; raised when a key changes its meaning or goes
+WIDTH = 120
+
+
+@dataclass(frozen=True)
+class CertifyOptions:
+    """What to certify, against whom, and how to show it.
+
+    Attributes:
+        results, test: where the test comes from; a run's number or an agent.
+        starts: "kept" or "fresh"; None for what is usual.
+        open_loop: the run's recorded actions instead of its agent.
+        param: parameters of the agent in place of its own.
+        egos: as a command line names them.
+        ego_param: their parameters, ``LABEL.KEY``.
+        runs, seed: episodes an ego, and where their seeds come from.
+        apart: other results whose seeds are not to be used.
+        confidence: of the bounds for all egos together.
+        jobs: episodes at a time.
+        output: results file; None keeps none.
+        resume, overwrite, exit_zero, quiet: see ``Manner``.
+        as_json: as JSON instead of a table.
+    """
+
+    results: Path
+    test: str
+    starts: str | None = None
+    open_loop: bool = False
+    param: Params = dataclasses.field(default_factory=dict)
+    egos: Sequence[str] = ()
+    ego_param: Params = dataclasses.field(default_factory=dict)
+    runs: int = 100
+    seed: int = 1
+    apart: Sequence[Path] = ()
+    confidence: float = 0.95
+    jobs: int | None = None
+    output: Path | None = None
+    resume: bool = False
+    overwrite: bool = False
+    exit_zero: bool = False
+    quiet: bool = False
+    as_json: bool = False
+
+
+def certify(order: CertifyOptions) -> int:
+    """Play the test and say what holds; everything is checked before anything is written."""
+    _check(order)
+    means = Means(order.jobs)
+    plan, manifest = recorded_plan(order.results)
+    egos = opponents(order.egos, order.ego_param, plan.scenario)
+    seeds = used([order.results, *order.apart], order.param)
+    subject, record = _subject(order, plan, manifest)
+    seed = fresh_seed(order.seed, order.runs, seeds.seeds)
+    parts = _parts(order, manifest, subject, egos, seed)
+    manner = Manner(
+        resume=order.resume,
+        overwrite=order.overwrite,
+        quiet=order.quiet,
+        exit_zero=order.exit_zero,
+    )
+    with _output(order) as output:
+        batches = [_marked(b, order, subject) for b in checked(parts, output, manner)]
+        _check_batches(order, batches, subject, record)
+        _warn(manifest, batches[0].prepared, record, seeds, subject)
+        if not order.quiet:
+            print(_first_lines(order, subject, seeds, seed), file=sys.stderr)
+        ended, interrupted = played(batches, means, manner)
+        if interrupted:
+            left = " --resume goes on" if order.output else ""
+            print(f"cavsumo: interrupted, so nothing is certified;{left}", file=sys.stderr)
+            return Exit.INTERRUPTED
+        _show(order, certified(ended, egos, order.confidence), subject, seeds, seed)
+    return exit_status(ended, interrupted, order.exit_zero)
+
+
+# Checked
+
+
+def _check(order: CertifyOptions) -> None:
+    """Refuse what can be seen to be wrong at once."""
+    if not 0.0 < order.confidence < 1.0:
+        raise InputError(f"--confidence: expected a share below 1, got {order.confidence:g}")
+    if order.runs < 1:
+        raise InputError(f"--runs: expected at least 1, got {order.runs}")
+    if not 0 <= order.seed < 2**63:
+        raise InputError(f"--seed: expected a number from 0 to 2^63 - 1, got {order.seed}")
+    if order.resume and order.output is None:
+        raise InputError("--resume: which results? name them with -o FILE")
+    if order.open_loop and order.starts == "fresh":
+        raise InputError("--open-loop: recorded actions need the starts that they were chosen for")
+    if not order.test.isdecimal() and (order.open_loop or order.starts == "kept"):
+        what = "--open-loop" if order.open_loop else "--starts kept"
+        raise InputError(f"{what}: {order.test!r} is no run, of which actions and starts are known")
+
+
+def _check_batches(
+    order: CertifyOptions, batches: Sequence[CheckedBatch], subject: Subject, record: Record | None
+) -> None:
+    """Refuse to write over what is read, and starts that another ego would change."""
+    read = {file.resolve() for file in (order.results, *order.apart)}
+    for batch in batches:
+        if batch.output.resolve() in read:
+            raise InputError(f"output {str(batch.output)!r}: is one of the results")
+    if record is None or subject.starts_seed is None:
+        return
+    seed, ours = subject.starts_seed, subject.starts
+    if ours is None:
+        ours = _drawn(prepare(record.plan), seed)
+    for batch in batches:
+        if _drawn(batch.prepared, seed) != list(ours):
+            raise InputError(
+                f"ego {batch.name}: the starts of run {record.run} cannot be kept, because they "
+                "would be drawn otherwise for this ego or on these files; --starts fresh draws anew"
+            )
+
+
+def _drawn(prepared: PreparedBatch, seed: int) -> list[tuple[float, float, float]]:
+    """Where testers start in a prepared batch."""
+    scenario = prepared.plan.scenario
+    ego = make_ego(scenario.ego, scenario.ego_params).kind
+    kinds = [kind_named(scenario.kind)] * scenario.testers
+    starts = prepared.site.draw(kinds, ego, scenario.start_speed, starts_generator(seed))
+    return [(start.x, start.y, start.o) for start in starts]
+
+
+# What is played
+
+
+def _subject(
+    order: CertifyOptions, plan: BatchPlan, manifest: Mapping[str, Any]
+) -> tuple[Subject, Record | None]:
+    """The test, and the run that it comes from if it does."""
+    if not order.test.isdecimal():
+        return of_policy(order.test, plan, manifest, order.results, order.param), None
+    record = recorded(order.results, int(order.test))
+    kept = order.starts != "fresh"
+    return of_run(record, order.param, kept=kept, open_loop=order.open_loop), record
+
+
+def _parts(
+    order: CertifyOptions, manifest: Mapping[str, Any], subject: Subject, egos: Egos, seed: int
+) -> list[Part]:
+    """A batch for each ego."""
+    try:
+        return product(settings_of(subject, manifest, order.runs, seed), [choices(egos)])
+    except ValueError as error:
+        raise InputError(f"--egos: {error}; LABEL=EGO gives another name") from error
+
+
+def _marked(batch: CheckedBatch, order: CertifyOptions, subject: Subject) -> CheckedBatch:
+    """A batch whose manifest says what it certifies."""
+    mark = {"certifies": {"test": subject.words, "results": str(order.results)}}
+    return dataclasses.replace(batch, manifest={**batch.manifest, **mark})
+
+
+@contextlib.contextmanager
+def _output(order: CertifyOptions) -> Iterator[Path]:
+    """Where the results go; without a name for them to where they are soon gone."""
+    if order.output is not None:
+        yield order.output
+        return
+    with tempfile.TemporaryDirectory(prefix="cavsumo-certify-") as folder:
+        yield Path(folder) / "certify.csv"
+
+
+# Said
+
+
+def _warn(
+    manifest: Mapping[str, Any],
+    prepared: PreparedBatch,
+    record: Record | None,
+    seeds: Used,
+    subject: Subject,
+) -> None:
+    """Say on stderr what a reader of the certificate should know."""
+    for part, now in (("versions", prepared.versions), ("sha256", prepared.checksums)):
+        was = manifest.get(part) or {}
+        for name in sorted(was.keys() & now.keys()):
+            if was[name] != now[name]:
+                said = f"{part}: {name} was {was[name]}, is {now[name]}"
+                print(f"cavsumo: {said}", file=sys.stderr)
+    if record is not None and record.row["outcome"] not in ("held", "violated"):
+        said = f"run {record.run} was no test: {record.row['outcome']}"
+        print(f"cavsumo: {said}", file=sys.stderr)
+    policy = policy_file(labelled(subject.agent)[1])
+    for file in (*seeds.silent, *([policy] if policy else [])):
+        said = f"{file} does not say from which seeds it was learned; --apart RESULTS excludes some"
+        print(f"cavsumo: {said}", file=sys.stderr)
+
+
+def _first_lines(order: CertifyOptions, subject: Subject, seeds: Used, seed: int) -> str:
+    """What is certified, what is kept and what is drawn."""
+    starts = "kept" if subject.starts_seed is not None else "drawn anew"
+    files = ", ".join(map(str, seeds.results))
+    return (
+        f"cavsumo: certify {subject.words}; its starts are {starts}\n"
+        f"cavsumo: {order.runs} seeds an ego from seed {seed}, none of the {len(seeds.seeds)} of "
+        f"{files}"
+    )
+
+
+def _show(
+    order: CertifyOptions, found: TriggerCertificate, subject: Subject, seeds: Used, seed: int
+) -> None:
+    """Print the certificate."""
+    if order.as_json:
+        facts = {
+            "format": FORMAT,
+            "test": subject.words,
+            "agent": subject.agent,
+            "params": dict(subject.params),
+            "starts_seed": subject.starts_seed,
+            "seed": seed,
+            "seeds_excluded": len(seeds.seeds),
+            "results_excluded": list(map(str, seeds.results)),
+        }
+        print(json.dumps(facts | as_json(found), indent=1, ensure_ascii=False, allow_nan=False))
+        return
+    console = Console(width=WIDTH)
+    console.print(as_table(found), highlight=False)
+    console.print()
+    for sentence in sentences(found):
+        console.print(sentence, markup=False, highlight=False, soft_wrap=True)

@@ -1,0 +1,214 @@
+"""``cavsumo import-osm``: a network from an OpenStreetMap extract, by netconvert."""
+
+from __future__ import annotations
+
+import gzip
+import shlex
+import sys
+import tempfile
+from contextlib import suppress
+from dataclasses import dataclass
+from pathlib import Path
+
+from cavsumo import __version__
+from cavsumo.errors import Exit, InputError
+from cavsumo.network.facts import Facts, facts
+from cavsumo.network.osm.extract import Box, find_roads, parse_box, write_roads
+from cavsumo.network.osm.handedness import warning
+from cavsumo.network.osm.netconvert import (
+    ODBL,
+    OSM_OPTIONS,
+    in_comment,
+    netconvert,
+    netconvert_version,
+    sumo_home,
+    typemap_option,
+    warning_summary,
+    with_notice,
+    zebra_patch,
+)
+from cavsumo.network.reader import read_network
+
+EXTRACT, NET, PATCH, ZEBRA_NET = (
+    "extract.osm.xml",
+    "network.net.xml",
+    "zebra.con.xml",
+    "zebra.net.xml",
+)
+ZEBRA_OPTIONS = (
+    f"sumo-net-file={NET}",
+    f"connection-files={PATCH}",
+    "output.street-names",
+    "output.original-names",
+    f"output-file={ZEBRA_NET}",
+)
+ENDINGS = (".net.xml", ".net.xml.gz")
+
+
+@dataclass(frozen=True)
+class ImportOptions:
+    """What to import, and how.
+
+    Attributes:
+        source: the extract.
+        output: the network to write.
+        bbox: west, south, east, north as written, or None for all of it.
+        left_hand: traffic keeps left.
+        keep_pedestrian_signals: keep traffic lights that only stop cars for pedestrians.
+        zebra: pedestrians have priority on crossings without traffic lights.
+        overwrite: replace another network.
+        time_limit_s: how long netconvert may take [s].
+    """
+
+    source: Path
+    output: Path
+    bbox: str | None
+    left_hand: bool
+    keep_pedestrian_signals: bool
+    zebra: bool
+    overwrite: bool
+    time_limit_s: float
+
+
+def import_osm(order: ImportOptions) -> int:
+    """Make the network; nothing is written unless all went well."""
+    _check(order)
+    box = None if order.bbox is None else parse_box(order.bbox)
+    roads = find_roads(order.source, box)
+    about = warning(roads.hints, box or roads.bounds or (0, 0, 0, 0), order.left_hand)
+    with tempfile.TemporaryDirectory(prefix="cavsumo-") as name:
+        folder = Path(name)
+        with (folder / EXTRACT).open("w", encoding="utf-8", newline="\n") as stream:
+            write_roads(order.source, roads, stream)
+        options = _options(order, box)
+        said = netconvert([*options, typemap_option(str(sumo_home()))], folder, order.time_limit_s)
+        said += _zebra(folder, order.time_limit_s) if order.zebra else []
+        network = _with_notice((folder / NET).read_text(encoding="utf-8"), order, options)
+        (folder / NET).write_text(network, encoding="utf-8", newline="\n")
+        made = facts(read_network(folder / NET))
+    log = _log_file(order.output)
+    _publish(order, network, "".join(f"{line}\n" for line in said), log)
+    remarks = [f"warning: {about}"] if about else []
+    remarks += [f"note: {note}" for note in made.notes]
+    for line in [*remarks, *warning_summary(said, log)]:
+        print(line if line.startswith(" ") else f"cavsumo: {line}", file=sys.stderr)
+    print(_what_was_made(order.output, made))
+    return Exit.OK
+
+
+def _check(order: ImportOptions) -> None:
+    """Refuse what cannot become a network file, before any work."""
+    output = order.output
+    if not output.name.endswith(ENDINGS) or output.name in ENDINGS:
+        raise InputError(f"output {str(output)!r}: expected a name that ends in .net.xml")
+    if not output.parent.is_dir():
+        raise InputError(f"output {str(output)!r}: no such folder {str(output.parent)!r}")
+    for file in (output, _log_file(output)):
+        if file.is_dir():
+            raise InputError(f"output {str(output)!r}: its place is taken by a folder")
+    sumo_home()
+
+
+def _options(order: ImportOptions, box: Box | None) -> list[str]:
+    """netconvert's options, apart from the type maps, whose place differs between machines."""
+    left_out = {"tls.discard-simple"} if order.keep_pedestrian_signals else set()
+    return [
+        f"osm-files={EXTRACT}",
+        *(option for option in OSM_OPTIONS if option not in left_out),
+        *(["lefthand"] if order.left_hand else []),
+        *([f"keep-edges.in-geo-boundary={','.join(map(str, box))}"] if box else []),
+        "aggregate-warnings=-1",  # every one of them is for the log
+        f"output-file={NET}",
+    ]
+
+
+def _zebra(folder: Path, time_limit_s: float) -> list[str]:
+    """Give the crossings without traffic lights priority; what netconvert says to it."""
+    network = read_network(folder / NET)
+    crossings = [
+        (
+            str(edge.getFromNode().getID()),
+            network.crossed_by(edge),
+            float(edge.getLanes()[0].getWidth()),
+        )
+        for edge in network.crossings()
+        # A patch of a junction with traffic lights would make netconvert fail.
+        if not str(edge.getFromNode().getType()).startswith("traffic_light")
+    ]
+    if not crossings:
+        return []
+    (folder / PATCH).write_text(zebra_patch(crossings), encoding="utf-8", newline="\n")
+    said = netconvert(ZEBRA_OPTIONS, folder, time_limit_s)
+    (folder / ZEBRA_NET).replace(folder / NET)
+    return said
+
+
+def _with_notice(network: str, order: ImportOptions, options: list[str]) -> str:
+    """The network with its licence and how it was made, without names of this machine."""
+    zebra = f"then netconvert {' '.join(ZEBRA_OPTIONS)}"
+    words = [in_comment(order.source.name), *(f"bbox={order.bbox}" for _ in [order.bbox] if _)]
+    words += [
+        word
+        for word, asked in (
+            ("left-hand", order.left_hand),
+            ("keep-pedestrian-signals", order.keep_pedestrian_signals),
+            ("zebra", order.zebra),
+        )
+        if asked
+    ]
+    head = (
+        f"{ODBL}\n\nMade by cavsumo {__version__} with netconvert {netconvert_version()}, each "
+        "option with two hyphens before it:"
+    )
+    lines = [
+        f"cavsumo import-osm {' '.join(words)}",
+        f"netconvert {' '.join([*options, typemap_option('$SUMO_HOME')])}",
+        *([zebra] if order.zebra else []),
+    ]
+    return with_notice(network, head, lines)
+
+
+def _publish(order: ImportOptions, network: str, log_text: str, log: Path) -> None:
+    """Put the network and its log in place, each as a whole."""
+    data = network.encode("utf-8")
+    if order.output.suffix == ".gz":
+        data = gzip.compress(data, mtime=0)
+    if order.output.exists() and not order.overwrite and order.output.read_bytes() != data:
+        raise InputError(
+            f"output {str(order.output)!r}: is another network, perhaps edited by hand; replace it "
+            "with --overwrite"
+        )
+    try:
+        _write(log, log_text.encode("utf-8"))
+        _write(order.output, data)
+    except OSError as error:
+        raise InputError(f"output {str(order.output)!r}: {error.strerror}") from error
+
+
+def _write(file: Path, data: bytes) -> None:
+    """Replace a file as a whole: a reader sees the old one or the new one."""
+    part = file.with_name(f".{file.name}.part")
+    try:
+        part.write_bytes(data)
+        part.replace(file)
+    finally:
+        with suppress(OSError):
+            part.unlink()
+
+
+def _log_file(output: Path) -> Path:
+    """The log beside a network."""
+    return output.with_name(output.name.removesuffix(".gz").removesuffix(".xml") + ".log")
+
+
+def _what_was_made(output: Path, made: Facts) -> str:
+    """One line about the network, and what to do with it."""
+    name = shlex.quote(str(output))
+    side = ", left-hand traffic" if made.left_hand else ""
+    lights = f"{made.traffic_lights} traffic light{'' if made.traffic_lights == 1 else 's'}"
+    return (
+        f"{output}: {made.edges} edges, {made.crossings} crossings, {lights}, "
+        f"{made.width_m:.0f} x {made.height_m:.0f} m{side}\n"
+        f"       cavsumo inspect {name}\n"
+        f"       cavsumo run --net {name}"
+    )

@@ -1,0 +1,18 @@
+"""``cavsumo merge``: the results of shards as the one file that a single run would have written."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+from cavsumo.batch.merge import merged
+from cavsumo.batch.summary import summarise
+from cavsumo.errors import Exit
+
+
+def merge(parts: Sequence[Path], output: Path, overwrite: bool, quiet: bool) -> int:
+    """Merge the parts and say what they hold."""
+    whole = merged(parts, output, overwrite=overwrite)
+    if not quiet:
+        summarise([whole])
+    return Exit.OK

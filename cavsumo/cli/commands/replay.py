@@ -1,0 +1,113 @@
+"""``cavsumo replay``: a recorded episode once more, compared frame by frame, bit for bit."""
+
+from __future__ import annotations
+
+import sys
+from dataclasses import dataclass
+from pathlib import Path
+
+from cavsumo.batch.prepared import PreparedBatch, manifest, prepare
+from cavsumo.batch.replay import Record, compare, located, recorded, recorded_alone, replayed
+from cavsumo.batch.worker import Worker
+from cavsumo.errors import Exit, InputError
+from cavsumo.interop.fcd import write_fcd
+from cavsumo.results.provenance import changes
+from cavsumo.results.traces import Trace, parsed
+
+TRACE = ".jsonl"  # how the name of a trace ends
+
+
+@dataclass(frozen=True)
+class ReplayOptions:
+    """What a replay is asked for.
+
+    Attributes:
+        run: number of the episode in results; None when a trace is given.
+        net, routes: where the network and the routes are, if not where they were.
+        recorded: take the trace as it is and play nothing.
+        html, fcd: files to write.
+        gui: show it in sumo-gui, with so many milliseconds a timestep.
+    """
+
+    run: int | None = None
+    net: Path | None = None
+    routes: Path | None = None
+    recorded: bool = False
+    html: Path | None = None
+    fcd: Path | None = None
+    gui: bool = False
+    delay: float | None = None
+
+    @property
+    def shown(self) -> bool:
+        """Whether the trace is of any use."""
+        return bool(self.html or self.fcd or self.gui)
+
+
+def replay(file: Path, wanted: ReplayOptions = ReplayOptions()) -> int:
+    """Play an episode again and show it; raises DivergenceError where it first differs."""
+    for option, output in (("--html", wanted.html), ("--fcd", wanted.fcd)):
+        if output is not None and not output.parent.is_dir():
+            raise InputError(f"{option} {str(output)!r}: no such folder {str(output.parent)!r}")
+    if wanted.gui:
+        from cavsumo.interop.gui import check_gui
+
+        check_gui(wanted.delay)
+    record = _record(file, wanted)
+    prepared = prepare(record.plan)
+    trace = _recorded_trace(record) if wanted.recorded else _played(prepared, record)
+    if wanted.shown and trace is None:
+        raise InputError(f"replay: run {record.run} ended in an error, there is nothing to show")
+    if trace is not None:
+        _show(prepared, record, trace, wanted)
+    return Exit.OK
+
+
+def _record(file: Path, wanted: ReplayOptions) -> Record:
+    """The episode that is meant, with its files."""
+    if file.suffix == TRACE:
+        if wanted.run is not None:
+            raise InputError(f"replay: {str(file)!r} is the trace of one episode; no run is named")
+        return located(recorded_alone(file), wanted.net, wanted.routes)
+    if wanted.run is None:
+        raise InputError(f"replay: which run of {str(file)!r}? name its number")
+    record = recorded(file, wanted.run)
+    if wanted.net or wanted.routes:
+        return located(record, wanted.net, wanted.routes)
+    return record
+
+
+def _recorded_trace(record: Record) -> Trace:
+    """The trace as it was recorded."""
+    if record.trace is None:
+        raise InputError(f"--recorded: no trace was kept of run {record.run}; it must be played")
+    print(f"run {record.run} ({record.row['agent']}): {record.row['outcome']}, as recorded")
+    return record.trace
+
+
+def _played(prepared: PreparedBatch, record: Record) -> Trace | None:
+    """The trace of the episode played again, the recorded one; None where an error left none."""
+    for change in changes(record.origin, manifest(prepared)):
+        print(f"cavsumo: {change}", file=sys.stderr)
+    with Worker(prepared) as worker:
+        again = replayed(worker, record)
+    compare(record, again)
+    frames = record.trace.frames if record.trace is not None else None
+    compared = f"{len(frames)} frames" if frames is not None else "its row (no trace was kept)"
+    row = record.row
+    print(f"run {record.run} ({row['agent']}): {row['outcome']}, {compared}: the same")
+    return parsed(again.trace) if again.trace else None
+
+
+def _show(prepared: PreparedBatch, record: Record, trace: Trace, wanted: ReplayOptions) -> None:
+    """Write and show what was asked for."""
+    if wanted.fcd is not None:
+        write_fcd(trace, wanted.fcd)
+    if wanted.html is not None:
+        from cavsumo.report.pages.replay.page import write_page
+
+        write_page(record, trace, prepared.site, wanted.html)
+    if wanted.gui:
+        from cavsumo.interop.gui import show
+
+        show(trace, record.plan.scenario, prepared.site, wanted.delay)

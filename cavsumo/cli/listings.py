@@ -1,0 +1,90 @@
+"""What there is to choose from: agents, egos, assertions."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from inspect import Parameter
+from typing import Any
+
+from cavsumo.model.registry import Registry
+
+
+def registries() -> dict[str, Registry[Any]]:
+    """The registries by the plural of what they hold."""
+    from cavsumo.agents import AGENTS
+    from cavsumo.assertions import ASSERTIONS
+    from cavsumo.egos import EGOS
+
+    return {"agents": AGENTS, "egos": EGOS, "assertions": ASSERTIONS}
+
+
+def listing(sort: str, name: str | None) -> str:
+    """One line for each entry, or one entry with its parameters, defaults and units."""
+    registry = registries()[sort]
+    if sort == "agents" and name is not None and name.startswith("policy:"):
+        return _policy(name)
+    if name is None:
+        lines = {n: registry.summary(n) for n in registry}
+        return "\n".join(_columns({**lines, **_forms(sort)}))
+    if sort == "egos":
+        registry = _registry_of(name, registry)
+        name = name.partition(":")[0]
+    elif sort == "assertions":
+        registry = _with_own(name)
+    shown = {
+        f"{p.name}={p.default}": p.doc
+        for p in registry.parameters(name)
+        if p.default is not Parameter.empty  # what stands behind the colon
+    }
+    return "\n".join(
+        [f"{name}: {registry.summary(name)}", *(f"  {line}" for line in _columns(shown))]
+    )
+
+
+def _columns(lines: Mapping[str, str]) -> list[str]:
+    """Two columns, the first as wide as need be."""
+    width = max(map(len, lines), default=0)
+    return [f"{first:{width}}  {second}" for first, second in lines.items()]
+
+
+def _forms(sort: str) -> Mapping[str, str]:
+    """How one from the user is named."""
+    from cavsumo.assertions import specs as assertions
+    from cavsumo.egos import specs as egos
+
+    policies = {"policy:FILE": "a tester that you trained, in a policy file (.npz)"}
+    forms = {"egos": egos.FORMS, "assertions": assertions.FORMS, "agents": policies}
+    return forms.get(sort, {})
+
+
+def _with_own(assertion: str) -> Registry[Any]:
+    """The assertions, with the user's own if it is one."""
+    from cavsumo.assertions.specs import registry_of
+
+    return registry_of([assertion], {})
+
+
+def _registry_of(ego: str, registered: Registry[Any]) -> Registry[Any]:
+    """Where the parameters of an ego are found: exec and tcp have a registry of their own."""
+    from cavsumo.egos.external.ego import EXTERNAL
+
+    return EXTERNAL if ego.partition(":")[0] in EXTERNAL else registered
+
+
+def _policy(spec: str) -> str:
+    """What a policy file says of itself."""
+    from cavsumo.agents.policy import policy_file
+    from cavsumo.agents.policy_file import read_policy
+
+    file = policy_file(spec)
+    assert file is not None
+    policy = read_policy(file)
+    header = policy.header
+    sizes = [len(policy.mean), *(len(biases) for _, biases in policy.layers)]
+    facts: dict[str, str] = {
+        "bodies": f"{header.bodies} {header.kind} a team",
+        "actions": f"{header.actions}, each for {header.hold} timesteps",
+        "network": f"{' > '.join(map(str, sizes))}, {header.activation}",
+    } | {key: str(value) for key, value in header.metadata.items()}
+    title = f"{spec}: a trained policy; what it is shown: cavsumo/agents/observations.py"
+    return "\n".join([title, *(f"  {line}" for line in _columns(facts))])

@@ -1,0 +1,128 @@
+"""Options of the command certify; the heavy parts are imported when it is called."""
+
+from __future__ import annotations
+
+import argparse
+import dataclasses
+from pathlib import Path
+from typing import Any
+
+from cavsumo.cli.scenario_settings import assignment
+
+
+def add_certify(commands: Any) -> None:
+    """The command certify."""
+    certify = commands.add_parser(
+        "certify",
+        help="replay a test over fresh seeds and egos; bound from below how often it triggers",
+        description="Replay a test over fresh seeds and a list of egos, and bound from below, ego "
+        "by ego, the probability that it triggers (Clopper and Pearson, one-sided, Bonferroni over "
+        "the egos). Of a run is kept: its agent with its parameters and what it knew before that "
+        "run, and where its testers started. Drawn anew: SUMO's chance, the agents' own, the "
+        "sensors'. No seed of RESULTS is used. What a learner learns in an episode is forgotten "
+        "after it.",
+        allow_abbrev=False,
+    )
+    certify.add_argument("results", type=Path, metavar="RESULTS", help="the CSV of a batch")
+    certify.add_argument(
+        "test",
+        metavar="RUN_OR_POLICY",
+        help="number of a run; or an agent of the results, or another one or policy:FILE, whose "
+        "starts are drawn anew",
+    )
+    _add_test(certify.add_argument_group("test"))
+    _add_egos(certify.add_argument_group("egos"))
+    batch = certify.add_argument_group("batch")
+    batch.add_argument(
+        "--runs", type=int, default=100, metavar="N", help="episodes an ego (default 100)"
+    )
+    batch.add_argument("--seed", type=int, default=1, help="of the fresh seeds (default 1)")
+    batch.add_argument(
+        "--apart",
+        type=Path,
+        action="append",
+        default=[],
+        metavar="RESULTS",
+        help="other results whose seeds are not used either, such as those of a training",
+    )
+    batch.add_argument(
+        "--confidence", type=float, default=0.95, metavar="C", help="of all bounds (default 0.95)"
+    )
+    batch.add_argument("-j", "--jobs", type=int, metavar="N", help="episodes at a time (default 1)")
+    _add_output(certify.add_argument_group("output"))
+    certify.set_defaults(command=_certify)
+
+
+def _add_test(group: Any) -> None:
+    add = group.add_argument
+    add(
+        "--starts",
+        choices=("kept", "fresh"),
+        help="where testers start: as in the run (default), or drawn anew",
+    )
+    add(
+        "--open-loop",
+        action="store_true",
+        help="of a run: its recorded actions, whatever happens, instead of its agent",
+    )
+    add(
+        "--param",
+        action="append",
+        default=[],
+        metavar="KEY=VALUE",
+        help="parameter of the agent in place of its own",
+    )
+
+
+def _add_egos(group: Any) -> None:
+    add = group.add_argument
+    add(
+        "--egos",
+        dest="egos",
+        action="append",
+        type=lambda text: tuple(text.split(",")),
+        metavar="A,B,...",
+        help="as for run --ego, or LABEL=EGO; default: that of the results, whose name also means "
+        "its parameters there",
+    )
+    add(
+        "--ego",
+        dest="egos",
+        action="append",
+        type=lambda text: (text,),
+        metavar="EGO",
+        help="one more, which may hold commas",
+    )
+    add(
+        "--ego-param",
+        action="append",
+        default=[],
+        metavar="LABEL.KEY=VALUE",
+        help="a parameter of an ego; KEY=VALUE if there is only one",
+    )
+
+
+def _add_output(group: Any) -> None:
+    add = group.add_argument
+    add(
+        "-o",
+        "--output",
+        type=Path,
+        metavar="FILE",
+        help="results file; FILE.csv becomes FILE-EGO.csv for each ego (default: none is kept)",
+    )
+    add("--resume", action="store_true", help="go on where the results end, or start")
+    add("--overwrite", action="store_true", help="start again in place of an unfinished batch")
+    add("--json", dest="as_json", action="store_true", help="print JSON (docs/guide.md)")
+    add("--exit-zero", action="store_true", help="a violation is no failure")
+    add("-q", "--quiet", action="store_true", help="no progress")
+
+
+def _certify(options: argparse.Namespace) -> int:
+    from cavsumo.cli.commands.certify import CertifyOptions, certify
+
+    given = {f.name: getattr(options, f.name) for f in dataclasses.fields(CertifyOptions)}
+    given["egos"] = tuple(word for words in options.egos or () for word in words)
+    given["param"] = dict(assignment("--param", word) for word in options.param)
+    given["ego_param"] = dict(assignment("--ego-param", word) for word in options.ego_param)
+    return certify(CertifyOptions(**given))

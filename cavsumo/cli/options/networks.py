@@ -1,0 +1,75 @@
+"""Options of inspect and import-osm; the heavy parts are imported when they are called."""
+
+from __future__ import annotations
+
+import argparse
+import dataclasses
+from pathlib import Path
+from typing import Any
+
+
+def add_inspect(commands: Any) -> None:
+    """The command inspect."""
+    inspect = commands.add_parser(
+        "inspect",
+        help="say what a network offers a test",
+        description="Say what a network offers a test: its figures, the junctions worth testing, "
+        "the ego's ways through them and where testers can meet it.",
+        allow_abbrev=False,
+    )
+    add = inspect.add_argument
+    add("net", type=Path, metavar="NET", help="SUMO network (.net.xml, .net.xml.gz)")
+    add("--junction", metavar="ID", help="look at this one (default: the best ones)")
+    add("--top", type=int, default=5, metavar="N", help="number of junctions (default 5)")
+    add("--json", dest="as_json", action="store_true", help="print JSON (docs/inspect.md)")
+    add("--picture", type=Path, metavar="FILE", help="draw the best junction (.png, .svg, .pdf)")
+    inspect.set_defaults(command=_inspect)
+
+
+def add_import_osm(commands: Any) -> None:
+    """The command import-osm."""
+    osm = commands.add_parser(
+        "import-osm",
+        help="make a network from OpenStreetMap data",
+        description="Make a network from OpenStreetMap data with SUMO's netconvert; needs the "
+        "extra: pip install 'cavsumo[osm]'.",
+        allow_abbrev=False,
+    )
+    add = osm.add_argument
+    add("source", type=Path, metavar="FILE", help=".osm, .osm.xml, the same as .gz, or .pbf")
+    add("-o", "--output", required=True, type=Path, metavar="FILE", help="NAME.net.xml")
+    add("--bbox", metavar="W,S,E,N", help="only roads that touch this box, in degrees")
+    add("--left-hand", action="store_true", help="traffic keeps left")
+    add("--zebra", action="store_true", help="priority for pedestrians where there are no signals")
+    add(
+        "--keep-pedestrian-signals",
+        action="store_true",
+        help="keep signals away from junctions; they may be badly timed",
+    )
+    add("--overwrite", action="store_true", help="replace another network")
+    add(
+        "--time-limit",
+        dest="time_limit_s",
+        type=float,
+        default=600.0,
+        metavar="S",
+        help="for netconvert [s] (default 600)",
+    )
+    osm.set_defaults(command=_import_osm)
+
+
+def _inspect(options: argparse.Namespace) -> int:
+    from cavsumo.cli.commands.inspect import InspectOptions, inspect
+
+    return inspect(
+        InspectOptions(
+            **{f.name: getattr(options, f.name) for f in dataclasses.fields(InspectOptions)}
+        )
+    )
+
+
+def _import_osm(options: argparse.Namespace) -> int:
+    from cavsumo.cli.commands.import_osm import ImportOptions, import_osm
+
+    values = {f.name: getattr(options, f.name) for f in dataclasses.fields(ImportOptions)}
+    return import_osm(ImportOptions(**values))

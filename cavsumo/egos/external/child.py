@@ -1,0 +1,84 @@
+"""An ego that is a child process: its stdin and stdout carry the lines, its stderr is kept."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import signal
+import subprocess
+import time
+from collections.abc import Sequence
+
+from cavsumo.egos.external.link import Link, Tail
+from cavsumo.errors import EgoError
+from cavsumo.model.processes import ending, leash, outer_environment
+
+GRACE_S = 1.0  # how long it may take to end by itself
+GLANCE_S = 0.01  # between two looks whether it has
+
+
+class Child(Link):
+    """A command that runs in the group of this process, so that whoever kills that kills it too.
+
+    It has three pipes, none of our other descriptors, Python's changes to signals undone, and the
+    environment of the command line.
+    """
+
+    def __init__(self, words: Sequence[str], tail: Tail) -> None:
+        put_on_leash = leash(os.getpid())
+
+        def before_exec() -> None:
+            put_on_leash()
+            signal.signal(signal.SIGINT, signal.SIG_DFL)  # a process of ours ignores it
+
+        try:
+            self._process = subprocess.Popen(
+                words,
+                bufsize=0,
+                stdin=subprocess.PIPE,
+                stdout=subprocess.PIPE,
+                stderr=subprocess.PIPE,
+                env=outer_environment(),
+                preexec_fn=before_exec,  # this process has no threads
+            )
+        except (OSError, ValueError, subprocess.SubprocessError) as error:
+            said = getattr(error, "strerror", None) or str(error)
+            raise EgoError(f"cannot be started: {said}: {words[0]!r}") from error
+        stdin, stdout, stderr = self._process.stdin, self._process.stdout, self._process.stderr
+        assert stdin
+        assert stdout
+        assert stderr
+        self._pipes = stdin, stdout, stderr
+        super().__init__(stdin.fileno(), stdout.fileno(), stderr.fileno(), tail)
+
+    def end(self, farewell: bytes = b"") -> None:
+        process = self._process
+        if farewell and process.poll() is None:
+            with contextlib.suppress(OSError):
+                os.write(self.sink, farewell)
+            self._pipes[0].close()
+            self._watch(GRACE_S)
+        process.kill()  # also when it is stopped; harmless when it has ended
+        with contextlib.suppress(subprocess.TimeoutExpired):
+            process.wait(10.0)
+        self.drain()
+        for pipe in self._pipes:
+            pipe.close()
+
+    def _gone(self) -> str:
+        code = self._watch(GRACE_S)
+        if code is None:
+            return "closed its stdin or stdout"
+        last = self.tail.last_line()
+        return ending(code) + (f" ({last})" if last else "")
+
+    def _watch(self, seconds: float) -> int | None:
+        """Wait for its end, reading what it writes meanwhile; None if it does not end."""
+        deadline = time.monotonic() + seconds
+        while (code := self._process.poll()) is None and time.monotonic() < deadline:
+            self.drain()
+            with contextlib.suppress(OSError):
+                os.read(self.source, 65536)  # so that it can write and end
+            time.sleep(GLANCE_S)
+        self.drain()
+        return code

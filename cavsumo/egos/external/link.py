@@ -1,0 +1,158 @@
+"""Lines to an ego outside and back, each reply within a deadline, over file descriptors.
+
+One thread, no buffer without a bound: while we wait for a reply we also read what the ego writes
+to its stderr, and while we write we read, so neither side can make the other wait for ever.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import math
+import os
+import select
+import time
+from abc import ABC, abstractmethod
+
+from cavsumo.egos.external.protocol import shown
+from cavsumo.errors import EgoError
+
+LINE_LIMIT = 65536  # bytes of a reply, its end not counted
+LOG_LIMIT = 65536  # bytes kept of what it writes to its stderr
+CHUNK = 65536
+
+
+class Tail:
+    """The last bytes of a stream, as many as LOG_LIMIT, and how many came before them."""
+
+    def __init__(self) -> None:
+        self._data, self._cut = bytearray(), 0
+
+    def add(self, chunk: bytes) -> None:
+        """Append bytes, forgetting the first ones of too many."""
+        self._data += chunk
+        excess = len(self._data) - LOG_LIMIT
+        if excess > 0:
+            del self._data[:excess]
+            self._cut += excess
+
+    def take(self) -> str:
+        """What is there, as text, a note before it if bytes were cut; then nothing is there."""
+        text = self._data.decode("utf-8", errors="backslashreplace")
+        note = f"[{self._cut} bytes before this are cut]\n" if self._cut else ""
+        self._data, self._cut = bytearray(), 0
+        return note + text
+
+    def last_line(self) -> str:
+        """The last line that is not blank, shortened; empty for none."""
+        text = self._data[-1000:].decode("utf-8", errors="replace")
+        lines = [line.strip() for line in text.splitlines() if line.strip()]
+        return lines[-1][:200] if lines else ""
+
+
+class Link(ABC):
+    """One ego outside: asked line by line, ended once.
+
+    Args:
+        sink, source: descriptors to write to and to read from; they are made non-blocking.
+        errors: one more to read from, whose bytes go to the tail.
+    """
+
+    def __init__(self, sink: int, source: int, errors: int | None, tail: Tail) -> None:
+        self.sink, self.source, self.errors, self.tail = sink, source, errors, tail
+        self._reading, self._writing = select.poll(), select.poll()
+        for fd in {source, *([] if errors is None else [errors])}:
+            os.set_blocking(fd, False)
+            self._reading.register(fd, select.POLLIN)
+            self._writing.register(fd, select.POLLIN)
+        os.set_blocking(sink, False)
+        both = select.POLLOUT | (select.POLLIN if sink == source else 0)
+        self._writing.register(sink, both)
+
+    def ask(self, line: bytes, seconds: float) -> bytes:
+        """The one line that answers a line; raises EgoError for anything else."""
+        deadline = time.monotonic() + seconds
+        unasked = self._read()
+        if unasked:
+            raise EgoError(f"wrote {shown(unasked)} before it was asked")
+        self._send(line, deadline, seconds)
+        return self._receive(deadline, seconds)
+
+    def drain(self) -> None:
+        """Read what it has written to its stderr."""
+        if self.errors is not None:
+            with contextlib.suppress(OSError):
+                while chunk := os.read(self.errors, CHUNK):
+                    self.tail.add(chunk)
+
+    @abstractmethod
+    def end(self, farewell: bytes = b"") -> None:
+        """End it: at once, or after a short while in which it may end itself after a last line."""
+
+    @abstractmethod
+    def _gone(self) -> str:
+        """How it ended, now that it reads or writes no more."""
+
+    def _send(self, line: bytes, deadline: float, seconds: float) -> None:
+        """Write a line, reading meanwhile."""
+        left = memoryview(line)
+        while True:
+            try:
+                left = left[os.write(self.sink, left) :]
+            except BlockingIOError:
+                pass
+            except OSError:
+                raise EgoError(self._gone()) from None
+            if not left:
+                return
+            if not self._wait(self._writing, deadline):
+                raise EgoError(f"did not read its input within {seconds:g} s")
+            if unasked := self._read():
+                raise EgoError(f"wrote {shown(unasked)} before it was asked")
+
+    def _receive(self, deadline: float, seconds: float) -> bytes:
+        """The line that comes."""
+        received = b""
+        while True:
+            in_time = self._wait(self._reading, deadline)
+            received += self._read()
+            line, end, more = received.partition(b"\n")
+            if len(line) > LINE_LIMIT:
+                raise EgoError(f"answered with a line longer than {LINE_LIMIT} bytes")
+            if more:
+                raise EgoError(f"wrote {shown(more)} after its answer")
+            if end:
+                return line
+            if not in_time:
+                raise EgoError(f"gave no answer within {seconds:g} s")
+
+    def _wait(self, poll: select.poll, deadline: float) -> bool:
+        """Wait until something can be read or written; whether there is time left then."""
+        left = deadline - time.monotonic()
+        for fd, _ in poll.poll(max(0, math.ceil(1000.0 * left))):
+            if fd == self.errors:
+                self._read_errors()
+        return left > 0.0
+
+    def _read(self) -> bytes:
+        """What can be read now, up to a bound; raises EgoError at the end of the stream."""
+        try:
+            chunk = os.read(self.source, CHUNK)
+        except BlockingIOError:
+            return b""
+        except OSError:
+            chunk = b""
+        if not chunk:
+            raise EgoError(self._gone())
+        return chunk
+
+    def _read_errors(self) -> None:
+        """Take up some of its stderr; at its end, listen no more."""
+        assert self.errors is not None
+        try:
+            chunk = os.read(self.errors, CHUNK)
+        except OSError:
+            chunk = b""
+        self.tail.add(chunk)
+        if not chunk:
+            self._reading.unregister(self.errors)
+            self._writing.unregister(self.errors)

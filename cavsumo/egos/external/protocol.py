@@ -1,0 +1,208 @@
+"""What cavsumo and an ego outside say to each other: messages to JSON lines, and replies checked.
+
+Pure text; how the lines travel is no matter here. ``docs/ego-protocol.md`` is the specification.
+Floats are written as Python's repr, the shortest text that reads back as the same number.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+from typing import Any
+
+from cavsumo.egos.base import Acceleration, Drive, Mission
+from cavsumo.errors import EgoError
+from cavsumo.model.bodies import Body, Kind
+from cavsumo.model.scene import Scene
+from cavsumo.model.snapshot import RawState, Snapshot
+
+PROTOCOL, VERSION = "cavsumo-ego", 1
+CLOSE = b'{"type":"close"}\n'
+SHOWN = 80  # characters of a reply that a message quotes
+# SUMO's letters of a traffic light (its documentation, "Traffic Lights", signal state definitions).
+LIGHTS = {
+    "r": "red",
+    "y": "yellow",
+    "Y": "yellow",
+    "g": "green",
+    "G": "green",
+    "u": "red-yellow",
+    "s": "stop",
+    "o": "blinking",
+    "O": "off",
+}
+
+
+# What cavsumo says --------------------------------------------------------------------------------
+
+
+def hello(mission: Mission, kind: Kind) -> bytes:
+    """The first line: the constants of the scenario."""
+    return _line(
+        {
+            "type": "hello",
+            "protocol": PROTOCOL,
+            "version": VERSION,
+            "timestep_s": mission.dt,
+            "horizon_s": mission.horizon,
+            "ego": {
+                "length_m": kind.length,
+                "width_m": kind.width,
+                "wheelbase_m": kind.wheelbase,
+                "speed_min_mps": kind.v_min,
+                "speed_max_mps": kind.v_max,
+                "acceleration_min_mps2": kind.throttle_min,
+                "acceleration_max_mps2": kind.throttle_max,
+                "steering_max_rad": kind.steering_max,
+            },
+            "network": str(mission.net.resolve()),
+            "route": {"edges": mission.edges, "points_m": mission.path.points},
+            "traffic_lights": [{"id": t.id, "stop_line_m": t.along} for t in mission.lights],
+        }
+    )
+
+
+def reset(seed: int) -> bytes:
+    """The line that begins an episode."""
+    return _line({"type": "reset", "seed": seed})
+
+
+class Observations:
+    """Writes the observations of one episode."""
+
+    def __init__(self, scene: Scene) -> None:
+        self._scene = scene
+        self._half = scene.ego.kind.length / 2
+        # The object of each body up to its numbers, its last state and the whole object then. By
+        # identity, which is quick to look up; the state keeps the body, so that no other one takes
+        # its identity.
+        self._known: dict[int, tuple[str, RawState, str]] = {}
+
+    def line(self, snapshot: Snapshot) -> bytes:
+        """What is seen at one timestep."""
+        _, x, y, v, o = snapshot.ego
+        here = self._scene.ego_projection(snapshot)
+        bodies = [self._body(raw) for raw in (*snapshot.testers, *snapshot.raw_background)]
+        return (
+            f'{{"type":"observation","step":{snapshot.step},"time_s":{_f(snapshot.time)},'
+            f'"ego":{{"x_m":{_f(x)},"y_m":{_f(y)},"heading_rad":{_f(o)},"speed_mps":{_f(v)},'
+            f'"steering_rad":{_f(snapshot.ego_steering)},"along_m":{_f(here.along)},'
+            f'"lateral_m":{_f(here.lateral)}}},'
+            f'"traffic_light":{self._light(snapshot, here.along + self._half)},'
+            f'"bodies":[{",".join(bodies)}]}}\n'
+        ).encode()
+
+    def _body(self, state: RawState) -> str:
+        body, x, y, v, o = state
+        known = self._known.get(id(body))
+        if known is not None and known[1] == state:
+            return known[2]  # it stands
+        head = _head(body) if known is None else known[0]
+        text = f'{head}{_f(x)},"y_m":{_f(y)},"heading_rad":{_f(o)},"speed_mps":{_f(v)}}}'
+        self._known[id(body)] = head, state, text
+        return text
+
+    def _light(self, snapshot: Snapshot, front: float) -> str:
+        """The next traffic light whose stop line the front bumper has not passed."""
+        for light, letter in zip(self._scene.lights, snapshot.lights, strict=False):
+            if light.along >= front:
+                seen = {"id": light.id, "distance_m": light.along - front}
+                return _text(seen | {"state": LIGHTS.get(letter, "unknown"), "letter": letter})
+        return "null"
+
+
+def _head(body: Body) -> str:
+    """A body's object up to the first number that changes."""
+    kind = body.kind
+    constant = {"id": body.id, "kind": kind.name, "length_m": kind.length, "width_m": kind.width}
+    return _text(constant)[:-1] + ',"x_m":'
+
+
+_f = float.__repr__  # json's own way with floats; numpy's are floats too but have another repr
+
+
+def _text(data: Any) -> str:
+    return json.dumps(data, separators=(",", ":"), allow_nan=False)
+
+
+def _line(data: Any) -> bytes:
+    return (_text(data) + "\n").encode()
+
+
+# What the ego answers -----------------------------------------------------------------------------
+
+
+def check_hello(line: bytes) -> None:
+    """Raise EgoError unless this answers our hello in our version."""
+    reply = _typed(line, "hello")
+    if reply.get("version") != VERSION or isinstance(reply["version"], bool):
+        said = f"version {_quoted(reply['version'])}" if "version" in reply else "no version"
+        raise EgoError(f"speaks {said} of the protocol, expected version {VERSION}")
+
+
+def check_ready(line: bytes) -> None:
+    """Raise EgoError unless this answers a reset."""
+    _typed(line, "ready")
+
+
+def command(line: bytes) -> Acceleration | Drive:
+    """The command in the answer to an observation; its numbers may be out of range."""
+    reply = _object(line)
+    accelerates = "acceleration" in reply
+    if accelerates is ("throttle" in reply or "steering" in reply):
+        raise EgoError(
+            f"answered {shown(line)}, expected either acceleration or throttle and steering"
+        )
+    if accelerates:
+        return Acceleration(_number(reply, "acceleration"))
+    return Drive(_number(reply, "throttle"), _number(reply, "steering"))
+
+
+def names(command: Acceleration | Drive) -> tuple[str, ...]:
+    """What the numbers of a command are called in the protocol."""
+    return ("acceleration",) if isinstance(command, Acceleration) else ("throttle", "steering")
+
+
+def _typed(line: bytes, expected: str) -> dict[str, Any]:
+    """A reply of the type expected."""
+    reply = _object(line)
+    if reply.get("type") != expected:
+        raise EgoError(f'answered {shown(line)}, expected an object of "type" "{expected}"')
+    return reply
+
+
+def _object(line: bytes) -> dict[str, Any]:
+    """A reply as an object; raises EgoError with what it says of itself if it is an error."""
+    try:
+        reply = json.loads(line.decode())
+    except (ValueError, RecursionError):
+        raise EgoError(f"answered {shown(line)}, expected a line of JSON") from None
+    if not isinstance(reply, dict):
+        raise EgoError(f"answered {shown(line)}, expected a JSON object")
+    if "error" in reply:
+        raise EgoError(f"gave up: {_quoted(reply['error'])}")
+    return reply
+
+
+def _number(reply: dict[str, Any], name: str) -> float:
+    """A number of a reply, infinite when no float can hold it."""
+    value = reply.get(name)
+    if isinstance(value, bool) or not isinstance(value, (int, float)):
+        said = "nothing" if name not in reply else _quoted(value)
+        raise EgoError(f"{name} must be a number, got {said}")
+    try:
+        return float(value)
+    except OverflowError:
+        return math.inf if value > 0 else -math.inf
+
+
+def shown(line: bytes) -> str:
+    """A line as a message quotes it: in quotes, not too long."""
+    text = line.decode("utf-8", errors="backslashreplace")
+    return repr(text if len(text) <= SHOWN else text[:SHOWN] + "...")
+
+
+def _quoted(value: Any) -> str:
+    """A value of a reply, not too long."""
+    text = repr(value)
+    return text if len(text) <= SHOWN else text[:SHOWN] + "..."

@@ -1,0 +1,54 @@
+"""An ego whose driver is relieved in the middle of an episode: what if another had braked then?"""
+
+from __future__ import annotations
+
+from cavsumo.agents.driving import Course
+from cavsumo.egos.base import Acceleration, Command, Drive, Ego
+from cavsumo.egos.reference.base import Reference
+from cavsumo.model.scene import Scene
+from cavsumo.model.snapshot import Snapshot
+
+
+class Takeover(Ego):
+    """Drives as the original ego until a timestep, then as a reference driver who perceives there.
+
+    The reference keeps to the ego's path and brakes. Until its brake takes effect it leaves the
+    pedals as they are, but never gains speed: an ego that was braking goes on to. The original is
+    not asked again.
+
+    Args:
+        ego: the original; it is not closed.
+        reference: who takes over.
+        step: the timestep from which on the reference decides.
+        drives: whether the original steers itself; the reference then does so too, by pure pursuit
+            of the path, else SUMO keeps to the route.
+    """
+
+    def __init__(self, ego: Ego, reference: Reference, step: int, *, drives: bool) -> None:
+        self._ego, self._reference, self._step, self._drives = ego, reference, step, drives
+        self.kind, self.depart_speed = ego.kind, ego.depart_speed
+        self.sees_background = ego.sees_background
+
+    def vtype(self) -> dict[str, str]:
+        return self._ego.vtype()
+
+    def reset(self, scene: Scene) -> None:
+        self._ego.reset(scene)
+        self._dt = scene.dt
+        self._course = Course(scene.ego_path, self.kind, scene.dt, self.kind.v_max)
+        self._before: float | None = None  # speed at the timestep before
+        self._kept = 0.0  # acceleration that the pedals give as they are [m/s2]
+
+    def act(self, snapshot: Snapshot) -> Command:
+        v = snapshot.ego.v
+        if snapshot.step < self._step:
+            self._before = v
+            return self._ego.act(snapshot)
+        if snapshot.step == self._step and self._before is not None:
+            self._kept = min(0.0, (v - self._before) / self._dt)
+        elapsed = (snapshot.step - self._step) * self._dt
+        braking = self._reference.throttle(elapsed, self._dt, self.kind)
+        a = max(self.kind.throttle_min, min(self._kept, braking), -max(0.0, v) / self._dt)
+        if self._drives:
+            return Drive(a, self._course.steering(snapshot.ego))
+        return Acceleration(a)

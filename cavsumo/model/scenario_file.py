@@ -1,0 +1,60 @@
+"""Scenario files (TOML): the settings that stand in them, with their paths resolved."""
+
+from __future__ import annotations
+
+import tomllib
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from cavsumo.errors import InputError
+from cavsumo.model.labels import labelled
+from cavsumo.model.scenario import check_keys
+
+VARY = "vary"  # the table that makes a study of a scenario file
+PATH_KEYS = ("net", "routes", "additional")
+
+
+def read_config(file: Path) -> dict[str, Any]:
+    """The settings of a scenario file (TOML) that describes one scenario."""
+    data = read_toml(file)
+    if VARY in data:
+        raise InputError(f"config {str(file)!r}: [{VARY}] makes several of it; expected one")
+    return settings_in(data, file)
+
+
+def read_toml(file: Path) -> dict[str, Any]:
+    """What a scenario file holds, unchecked."""
+    try:
+        return tomllib.loads(file.read_text(encoding="utf-8"))
+    except OSError as error:
+        raise InputError(f"config {str(file)!r}: {error.strerror}") from error
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        raise InputError(f"config {str(file)!r}: {error}") from error
+
+
+def settings_in(data: Mapping[str, Any], file: Path, place: str = "") -> dict[str, Any]:
+    """The settings of a table of a scenario file: keys checked, paths resolved."""
+    check_keys(data, place or str(file))
+    return {k: _resolved(k, v, file.parent) for k, v in data.items()}
+
+
+def _resolved(key: str, value: Any, folder: Path) -> Any:
+    """A path of a scenario file, relative to that file, as SUMO has it in its own."""
+    if key == "agents" and isinstance(value, list):
+        return [_resolved_agent(name, folder) for name in value]
+    if key not in PATH_KEYS or value == "none":
+        return value
+    if isinstance(value, list):
+        return [str(folder / str(v)) for v in value]
+    return str(folder / str(value))
+
+
+def _resolved_agent(word: Any, folder: Path) -> Any:
+    """An agent of a scenario file; the file of a policy is a path like others."""
+    label, name = labelled(str(word))
+    prefix, _, file = name.partition(":")
+    if prefix != "policy" or not file:
+        return word
+    found = f"{prefix}:{folder / file}"
+    return found if label == name else f"{label}={found}"

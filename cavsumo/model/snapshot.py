@@ -1,0 +1,78 @@
+"""What everybody sees at one timestep: immutable, complete, cheap to make.
+
+Background bodies are kept as the plain tuples that the world read and become records only when
+somebody asks for them, because most agents never do.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+from cavsumo.model.bodies import Body
+from cavsumo.model.geometry import Box
+
+
+class BodyState(NamedTuple):
+    """A body and its state (seed, appendix): position of the box's centre, speed, orientation."""
+
+    body: Body
+    x: float  # m
+    y: float  # m
+    v: float  # m/s
+    o: float  # rad, anticlockwise from east, in (-pi, pi]
+
+    @property
+    def id(self) -> str:
+        """The body's id."""
+        return self.body.id
+
+    @property
+    def box(self) -> Box:
+        """The body's oriented box."""
+        kind = self.body.kind
+        return Box(self.x, self.y, self.o, kind.length, kind.width)
+
+
+RawState = tuple[Body, float, float, float, float]
+
+
+class Snapshot(NamedTuple):
+    """The state s of the simulation.
+
+    Attributes:
+        step: number of timesteps since the ego entered the network.
+        time: simulation time since then [s].
+        ego: the vehicle under test.
+        ego_steering: its steering angle in the last timestep [rad]; for an ego that SUMO moves,
+            the angle that its turn implies (seed, eq. 22).
+        testers: the tester's bodies, in the order of the scenario.
+        raw_background: everybody else, as plain tuples in the field order of BodyState. When no
+            ego, agent or assertion of the episode ``sees_background`` and nothing is recorded,
+            those are left out who cannot touch the ego or a tester now (see ``background``).
+        lights: what each of ``Scene.lights`` shows the ego, as SUMO's letter (G and g are green, y
+            is yellow, r is red).
+        unseen: ids of the ego and of testers whom a tester agent does not see through its sensor
+            (``sensors``): they are shown where it last saw them. None without such a sensor.
+        crossing_lights: what each of ``Scene.crossings`` shows who walks over it, empty for one
+            without lights. Sensors leave it out.
+    """
+
+    step: int
+    time: float
+    ego: BodyState
+    ego_steering: float
+    testers: tuple[BodyState, ...]
+    raw_background: tuple[RawState, ...] = ()
+    lights: tuple[str, ...] = ()
+    unseen: frozenset[str] | None = None
+    crossing_lights: tuple[str, ...] = ()
+
+    @property
+    def sees_ego(self) -> bool:
+        """Whether the ego is seen where it is."""
+        return not self.unseen or self.ego.body.id not in self.unseen
+
+    @property
+    def background(self) -> tuple[BodyState, ...]:
+        """Everybody in ``raw_background``, as records (made anew at each call)."""
+        return tuple(BodyState(*raw) for raw in self.raw_background)

@@ -1,0 +1,165 @@
+"""What is drawn of a junction: its surfaces, crossings, the ego's routes, where testers start."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Sequence
+from typing import Any
+
+import shapely
+from matplotlib import font_manager
+from matplotlib.axes import Axes
+from matplotlib.ft2font import FT2Font
+from matplotlib.patches import FancyArrowPatch, PathPatch
+from matplotlib.path import Path as Outline
+from matplotlib.patheffects import withStroke
+from shapely.geometry import LineString
+
+from cavsumo.model.polyline import Path as Polyline
+from cavsumo.network.drawing.surfaces import (
+    beside,
+    crossings,
+    junctions,
+    lane_kind,
+    lanes_by_kind,
+    markings,
+    stripes,
+    walking_areas,
+)
+from cavsumo.network.facts import PRIORITY, SIGNALS
+from cavsumo.network.inspection import InspectedNetwork, Way
+from cavsumo.network.reader import street
+
+Box = tuple[float, float, float, float]  # west, south, east, north [m]
+
+GROUND, ROAD, OTHER, PAVEMENT, WALKING = "#eef1ea", "#8b9096", "#b49a7c", "#d9d4c7", "#c9c2b0"
+LANES = {"road": ROAD, "other": OTHER, "pavement": PAVEMENT}
+TURNS = {"straight": "#1b7837", "left": "#2166ac", "right": "#d6604d", "u-turn": "#762a83"}
+AREA, AREA_EDGE = "#f5b301", "#a87400"
+CROSSING_LINES: dict[str, Any] = {"color": "white", "lw": 1.6, "ls": (0, (1.2, 0.8))}
+SIGNAL_DOTS: dict[str, Any] = {
+    "marker": "o",
+    "ms": 5,
+    "color": "#d7191c",
+    "mec": "white",
+    "mew": 0.8,
+}
+BESIDE_M = {"straight": 0.0, "left": 0.5, "right": -0.5, "u-turn": 1.0}  # routes are drawn apart
+
+
+# Surfaces
+
+
+def draw_surfaces(axes: Axes, here: InspectedNetwork, view: Box) -> None:
+    """Junctions, lanes by kind, the lines between them, walking areas, street names."""
+    network, window = here.network, shapely.box(*view)
+    _fill(axes, junctions(network), window, ROAD, 1)
+    for kind, surfaces in lanes_by_kind(network).items():
+        _fill(axes, surfaces, window, LANES[kind], 2)
+    _fill(axes, walking_areas(network), window, WALKING, 3)
+    for border, solid in markings(network):
+        if border.intersects(window):
+            style = "-" if solid else (0, (6, 6))
+            axes.plot(*border.xy, color="white", lw=0.7, ls=style, zorder=2.5)
+    _draw_names(axes, here, window)
+
+
+def lane_color(lane: Any) -> str:
+    """The colour of a lane by its kind."""
+    return LANES[lane_kind(lane)]
+
+
+def _draw_names(axes: Axes, here: InspectedNetwork, window: shapely.Geometry) -> None:
+    """Each street's name, where most of it is seen."""
+    best: dict[str, LineString] = {}
+    for edge in here.network.edges:
+        name, line = street(edge), LineString(edge.getShape()).intersection(window)
+        seen = line.geom_type == "LineString" and line.length > 3.0 * len(name)
+        if (
+            name
+            and seen
+            and has_glyphs(name)
+            and line.length > getattr(best.get(name), "length", 0)
+        ):
+            best[name] = line
+    for name, line in best.items():
+        where, ahead = line.interpolate(line.length / 2), line.interpolate(line.length / 2 + 1.0)
+        angle = math.degrees(math.atan2(ahead.y - where.y, ahead.x - where.x))
+        text = axes.text(where.x, where.y, name, fontsize=8, color="#222222", zorder=9)
+        text.set(rotation=(angle + 90) % 180 - 90, ha="center", va="center", rotation_mode="anchor")
+        text.set_path_effects([withStroke(linewidth=2.5, foreground="white", alpha=0.8)])
+
+
+def draw_crossings(axes: Axes, here: InspectedNetwork, view: Box) -> None:
+    """Zebra stripes where pedestrians have priority, two lines elsewhere, dots at signals."""
+    window = shapely.box(*view)
+    for axis, half, right in crossings(here.network):
+        if not axis.intersects(window):
+            continue
+        if right == PRIORITY:
+            _fill(axes, stripes(axis, half), window, "white", 4)
+            continue
+        for border in filter(None, (beside(axis, -half), beside(axis, half))):
+            axes.plot(*border.xy, **CROSSING_LINES, zorder=4)
+        if right == SIGNALS:
+            axes.plot(
+                *zip(axis.coords[0], axis.coords[-1], strict=True), ls="", **SIGNAL_DOTS, zorder=6
+            )
+
+
+def _fill(
+    axes: Axes,
+    shapes: Iterable[shapely.Geometry],
+    window: shapely.Geometry,
+    color: str,
+    z: float,
+    **style: Any,
+) -> None:
+    """Fill polygons, those that are in the picture, as one patch."""
+    outline = [
+        ring.coords
+        for shape in shapes
+        for part in getattr(shape, "geoms", [shape])
+        if part.geom_type == "Polygon" and part.intersects(window)
+        for ring in [shapely.geometry.polygon.orient(part).exterior]
+    ]
+    if outline:
+        path = Outline.make_compound_path(*(Outline(list(ring), closed=True) for ring in outline))
+        axes.add_patch(PathPatch(path, **{"facecolor": color, "lw": 0, "zorder": z} | style))
+
+
+# The test
+
+
+def draw_areas(axes: Axes, ways: Sequence[Way]) -> None:
+    """The stretches of pavement where testers start, of all routes together."""
+    everywhere = shapely.union_all(
+        [
+            LineString(a.pavement.cut(a.begin, a.end).points).buffer(a.width / 2, cap_style="flat")
+            for way in ways
+            for a in way.areas
+        ]
+    )
+    style = {"alpha": 0.75, "hatch": "////", "edgecolor": AREA_EDGE, "lw": 0.5}
+    _fill(axes, [everywhere], everywhere.envelope, AREA, 5, **style)
+
+
+def draw_routes(axes: Axes, ways: Sequence[Way]) -> None:
+    """The ego's routes, side by side, the best one widest and on top, arrows at their ends."""
+    for rank, way in reversed(list(enumerate(ways))):
+        line = LineString(way.route.path.points)
+        shown = beside(line, BESIDE_M[way.turn]) or line
+        path = Polyline(shown.coords)
+        color, wide, z = TURNS[way.turn], *((3.4, 8.0) if rank == 0 else (1.5, 7.0))
+        axes.plot(*shown.xy, color=color, lw=wide, zorder=z, solid_joinstyle="round")
+        axes.plot(*path.points[0], "o", color=color, ms=2 + 1.5 * wide, zorder=z)
+        tail, tip = path.at(path.length - 0.5)[:2], path.at(path.length + 3.0)[:2]
+        arrow = FancyArrowPatch(tail, tip, arrowstyle="-|>", mutation_scale=8 + 3 * wide)
+        arrow.set(color=color, zorder=z, lw=wide)
+        axes.add_patch(arrow)
+
+
+def has_glyphs(text: str) -> bool:
+    """Whether the font can write a text; without its letters only boxes would be seen."""
+    known = FT2Font(font_manager.findfont(font_manager.FontProperties())).get_charmap()
+    return all(ord(letter) in known for letter in text)

@@ -1,0 +1,154 @@
+"""A junction drawn from above: lanes, crossings, the ego's routes, where testers start.
+
+Needs matplotlib; draws into a file, never on a screen.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import shapely
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.patches import Patch
+from shapely.geometry import LineString
+
+from cavsumo.errors import InputError
+from cavsumo.network.drawing.layers import (
+    AREA,
+    AREA_EDGE,
+    GROUND,
+    OTHER,
+    PAVEMENT,
+    ROAD,
+    SIGNAL_DOTS,
+    TURNS,
+    WALKING,
+    Box,
+    draw_areas,
+    draw_crossings,
+    draw_routes,
+    draw_surfaces,
+    has_glyphs,
+    lane_color,
+)
+from cavsumo.network.drawing.surfaces import credit
+from cavsumo.network.facts import NONE, PRIORITY, SIGNALS, right_of_way
+from cavsumo.network.inspection import InspectedNetwork, Junction, Way
+from cavsumo.network.reader import lane_shape
+
+MARGIN_M = 12.0  # around the routes
+HEIGHT_IN, DPI = 9.0, 150
+CROSSING_LABELS = {
+    SIGNALS: "crossings at traffic lights",
+    PRIORITY: "crossings with priority",
+    NONE: "crossings without priority",
+}
+
+
+def draw(here: InspectedNetwork, junction: Junction | None, file: Path) -> None:
+    """Draw a junction, or the whole network when there is none; raises InputError."""
+    ways = junction.ways if junction else ()
+    view = _view(here, ways)
+    ratio = min(2.0, max(0.7, (view[2] - view[0]) / (view[3] - view[1])))
+    figure = Figure(figsize=(HEIGHT_IN * ratio, HEIGHT_IN), dpi=DPI)
+    axes = figure.add_subplot()
+    axes.set(xlim=view[::2], ylim=view[1::2], aspect="equal", xticks=[], yticks=[])
+    axes.set_facecolor(GROUND)
+    draw_surfaces(axes, here, view)
+    draw_crossings(axes, here, view)
+    draw_areas(axes, ways)
+    draw_routes(axes, ways)
+    _draw_scale(axes, view)
+    source = credit(here.network.file)
+    if source:
+        axes.text(0.995, 0.01, source, transform=axes.transAxes, ha="right", fontsize=7, zorder=11)
+    streets, name = _titles(here, junction)
+    axes.set_title(f"{streets}\n" if streets else "", loc="left", fontsize=13)
+    axes.text(0, 1.012, name, transform=axes.transAxes, fontsize=8, color="#444444")
+    axes.legend(
+        handles=_legend(here, ways), loc="upper left", bbox_to_anchor=(1.0, 1.0), frameon=False
+    )
+    dated = file.suffix.lower() in (".svg", ".pdf")  # the same picture is the same bytes
+    metadata = {"Date" if file.suffix.lower() == ".svg" else "CreationDate": None} if dated else {}
+    try:
+        figure.savefig(file, bbox_inches="tight", pad_inches=0.15, metadata=metadata)
+    except OSError as error:
+        raise InputError(f"--picture {str(file)!r}: {error.strerror}") from error
+
+
+def _view(here: InspectedNetwork, ways: Sequence[Way]) -> Box:
+    """What to show: the routes and what lies around them."""
+    paths = [LineString(way.route.path.points) for way in ways]
+    shown = paths or [
+        LineString(lane_shape(lane)) for e in here.network.edges for lane in e.getLanes()
+    ]
+    west, south, east, north = shapely.total_bounds(shown).tolist()
+    return west - MARGIN_M, south - MARGIN_M, east + MARGIN_M, north + MARGIN_M
+
+
+def _draw_scale(axes: Axes, view: Box) -> None:
+    """A bar of a round length, about a fifth of the picture, in a corner."""
+    wanted = (view[2] - view[0]) / 5
+    unit = 10 ** math.floor(math.log10(wanted))
+    length = max(step * unit for step in (1, 2, 5) if step * unit <= wanted)
+    x, y = view[0] + 0.03 * (view[2] - view[0]), view[1] + 0.04 * (view[3] - view[1])
+    tall = 0.006 * (view[3] - view[1])
+    axes.fill(
+        [x - tall, x + length + tall, x + length + tall, x - tall],
+        [y - 2 * tall, y - 2 * tall, y + 5 * tall, y + 5 * tall],
+        color="white",
+        alpha=0.8,
+        zorder=10,
+    )
+    axes.plot([x, x, x + length, x + length], [y + tall, y, y, y + tall], color="black", zorder=11)
+    axes.text(x + length / 2, y + tall, f"{length:g} m", ha="center", va="bottom", zorder=11)
+
+
+def _titles(here: InspectedNetwork, junction: Junction | None) -> tuple[str, str]:
+    """The streets, and the junction's id, as far as the font has the letters."""
+    file = here.network.file.name
+    if junction is None:
+        return "", file
+    streets = " / ".join(name for name in junction.streets if has_glyphs(name))
+    return streets, f"junction {junction.id}, {file}"
+
+
+def _legend(here: InspectedNetwork, ways: Sequence[Way]) -> list[Any]:
+    """What the colours mean, as far as they occur."""
+    handles: list[Any] = []
+    if ways:
+        best = f"ego's best route ({ways[0].turn})"
+        handles.append(Line2D([], [], color=TURNS[ways[0].turn], lw=3.4, label=best))
+    for turn, color in TURNS.items():
+        if any(way.turn == turn for way in ways):
+            handles.append(
+                Line2D([], [], color=color, lw=1.5, marker="o", ms=4, label=f"ego {turn}")
+            )
+    if any(way.areas for way in ways):
+        label = "testers start here"
+        handles.append(Patch(facecolor=AREA, hatch="////", edgecolor=AREA_EDGE, label=label))
+    rights = {right_of_way(crossing) for crossing in here.network.crossings()}
+    for right, label in CROSSING_LABELS.items():
+        if right in rights:
+            handles.append(_crossing_handle(right, label))
+    kinds = {lane_color(lane) for edge in here.network.edges for lane in edge.getLanes()}
+    named = {ROAD: "lanes for cars", OTHER: "other lanes", PAVEMENT: "pavements"}
+    handles += [Patch(color=c, label=label) for c, label in named.items() if c in kinds]
+    if here.network.inside("walkingarea"):
+        handles.append(Patch(color=WALKING, label="walking areas"))
+    return handles
+
+
+def _crossing_handle(right: str, label: str) -> Any:
+    """A crossing in the legend."""
+    if right == PRIORITY:
+        return Patch(facecolor=ROAD, hatch="|||", edgecolor="white", lw=0, label=label)
+    if right == SIGNALS:
+        style = {key: value for key, value in SIGNAL_DOTS.items() if key != "color"}
+        return Line2D([], [], lw=9, **style, mfc=SIGNAL_DOTS["color"], color=ROAD, label=label)
+    return Line2D([], [], lw=9, color=ROAD, marker="_", mec="white", mew=2, ms=14, label=label)

@@ -1,0 +1,283 @@
+"""OpenStreetMap extracts: their roads, read as XML or .pbf, written without mappers' names.
+
+Users' names and ids, changesets and dates are never copied: an item has its id, where it is, its
+tags and what it is made of.
+"""
+
+from __future__ import annotations
+
+import bz2
+import gzip
+import zlib
+from collections import Counter
+from collections.abc import Collection, Iterator, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, TextIO
+from xml.etree import ElementTree
+from xml.sax.saxutils import quoteattr
+
+from cavsumo.errors import InputError
+
+Box = tuple[float, float, float, float]  # west, south, east, north [degrees]
+DIGITS = 7  # decimals of a coordinate in OpenStreetMap
+EXTRA = "pip install 'cavsumo[osm]'"
+OPENERS = {b"\x1f\x8b": gzip.open, b"BZ": bz2.open}
+# Tracks are not driven on, but they divide the roads that they cross or lie in.
+TRACKS = frozenset({"highway", "railway"})
+# Tags whose values begin with the code of the country that made the rule.
+RULES = ("traffic_sign", "source:maxspeed", "maxspeed:type", "zone:traffic", "zone:maxspeed")
+KINDS = {"n": "node", "w": "way", "r": "relation"}
+
+
+@dataclass(frozen=True, slots=True)
+class Item:
+    """A node, way or relation.
+
+    Attributes:
+        kind: one of these words.
+        id: its number.
+        tags: its tags.
+        lat, lon: where a node is, as written [degrees].
+        refs: the nodes of a way.
+        members: of a relation: kind, id and role.
+    """
+
+    kind: str
+    id: int
+    tags: Mapping[str, str]
+    lat: str = ""
+    lon: str = ""
+    refs: tuple[int, ...] = ()
+    members: tuple[tuple[str, int, str], ...] = ()
+
+
+@dataclass
+class RoadExtract:
+    """What belongs to the roads of an extract, and what it says about where it is.
+
+    Attributes:
+        nodes, ways: ids of what is to be kept.
+        bounds: west, south, east, north of all nodes [degrees]; None without any.
+        hints: how often which key and value of a tag occur that tell country or side of the road.
+    """
+
+    nodes: set[int] = field(default_factory=set)
+    ways: set[int] = field(default_factory=set)
+    bounds: Box | None = None
+    hints: Counter[tuple[str, str]] = field(default_factory=Counter)
+
+
+def parse_box(text: str) -> Box:
+    """The box W,S,E,N of a command line."""
+    try:
+        west, south, east, north = (float(word) for word in text.split(","))
+    except ValueError:
+        raise InputError(
+            f"--bbox: expected four numbers W,S,E,N in degrees, got {text!r}"
+        ) from None
+    if not (-180 <= west < east <= 180 and -90 <= south < north <= 90):
+        raise InputError(
+            f"--bbox {text}: expected west < east and south < north, in degrees (longitude, "
+            "latitude, longitude, latitude)"
+        )
+    return west, south, east, north
+
+
+def find_roads(file: Path, box: Box | None) -> RoadExtract:
+    """The roads of an extract, whole, that touch the box; raises InputError when there are none."""
+    found, places = RoadExtract(), dict[int, tuple[float, float]]()
+    tracks: list[tuple[Item, bool]] = []  # ways, and whether they are roads
+    for item in read_items(file):  # in any order: Overpass may put ways before their nodes
+        _note_hints(item, found.hints)
+        if item.kind == "node":
+            places[item.id] = (float(item.lon), float(item.lat))
+        elif item.kind == "way" and not TRACKS.isdisjoint(item.tags):
+            tracks.append((item, "highway" in item.tags))
+    if not any(road for _, road in tracks):
+        raise InputError(f"extract {str(file)!r}: holds no roads (no way has the tag highway)")
+    found.bounds = _bounds(places.values())
+    near = False
+    for way, road in tracks:
+        if any(_within(places.get(ref), box) for ref in way.refs):
+            found.ways.add(way.id)
+            found.nodes.update(way.refs)
+            near = near or road
+    if not near:
+        raise InputError(f"extract {str(file)!r}: {_off_the_data(box, found.bounds)}")
+    return found
+
+
+def _bounds(places: Collection[tuple[float, float]]) -> Box | None:
+    """West, south, east, north of places; None without any."""
+    if not places:
+        return None
+    lons, lats = zip(*places, strict=True)
+    return min(lons), min(lats), max(lons), max(lats)
+
+
+def _within(place: tuple[float, float] | None, box: Box | None) -> bool:
+    """Whether a place is known and lies in the box, if there is one."""
+    if place is None or box is None:
+        return place is not None
+    return box[0] <= place[0] <= box[2] and box[1] <= place[1] <= box[3]
+
+
+def write_roads(file: Path, roads: RoadExtract, target: TextIO) -> None:
+    """Write the roads found in an extract as OSM XML, with whole turn restrictions.
+
+    Nodes come first, wherever they stand in the extract: netconvert finds no others.
+    """
+    behind: list[Item] = []
+    target.write(
+        '<?xml version="1.0" encoding="UTF-8"?>\n<osm version="0.6" generator="cavsumo">\n'
+    )
+    for item in read_items(file):
+        if _is_kept(item, roads):
+            if item.kind == "node":
+                target.writelines(_xml(item))
+            else:
+                behind.append(item)
+    for item in behind:
+        target.writelines(_xml(item))
+    target.write("</osm>\n")
+
+
+def read_items(file: Path) -> Iterator[Item]:
+    """The items of an extract in the order of the file; raises InputError in one sentence."""
+    if not file.is_file():
+        what = "is a folder" if file.is_dir() else "no such file"
+        raise InputError(f"extract {str(file)!r}: {what}")
+    if file.suffix == ".pbf":
+        yield from _pbf_items(file)
+        return
+    try:
+        yield from _xml_items(file)
+    except (ElementTree.ParseError, EOFError, OSError, zlib.error) as error:
+        raise InputError(f"extract {str(file)!r}: not well-formed XML: {error}") from error
+    except (KeyError, ValueError) as error:
+        raise InputError(
+            f"extract {str(file)!r}: an item without id or place: {type(error).__name__}: {error}"
+        ) from error
+
+
+def _xml_items(file: Path) -> Iterator[Item]:
+    """The items of an .osm, packed or not."""
+    with file.open("rb") as raw:
+        opener: Any = OPENERS.get(raw.read(2), open)
+    with opener(file, "rb") as stream:
+        root: Any = None
+        for event, element in ElementTree.iterparse(stream, events=("start", "end")):
+            if root is None:
+                root = element
+                _check_root(file, root.tag)
+            elif event == "end" and element.tag in ("node", "way", "relation"):
+                if element.get("action") != "delete" and element.get("visible") != "false":
+                    yield _from_xml(element)
+                root.clear()
+            elif event == "end" and element.tag == "remark":
+                raise InputError(f"extract {str(file)!r}: is incomplete: {element.text}")
+
+
+def _check_root(file: Path, tag: str) -> None:
+    """Refuse XML that is something else."""
+    if tag != "osm":
+        raise InputError(
+            f"extract {str(file)!r}: an OpenStreetMap extract begins with <osm>, this file with "
+            f"<{tag}>"
+        )
+
+
+def _from_xml(element: ElementTree.Element) -> Item:
+    """An item from its element."""
+    kind, number = element.tag, int(element.attrib["id"])
+    tags = {tag.attrib["k"]: tag.attrib["v"] for tag in element.findall("tag")}
+    if kind == "node":
+        lat, lon = element.attrib["lat"], element.attrib["lon"]
+        if not (abs(float(lat)) <= 90 and abs(float(lon)) <= 180):
+            raise ValueError(f"node {number} at {lat}, {lon}")
+        return Item(kind, number, tags, lat, lon)
+    if kind == "way":
+        refs = tuple(int(nd.attrib["ref"]) for nd in element.findall("nd"))
+        return Item(kind, number, tags, refs=refs)
+    members = tuple(
+        (m.attrib["type"], int(m.attrib["ref"]), m.get("role", ""))
+        for m in element.findall("member")
+    )
+    return Item(kind, number, tags, members=members)
+
+
+def _pbf_items(file: Path) -> Iterator[Item]:
+    """The items of a .pbf."""
+    try:
+        import osmium
+    except ImportError:
+        raise InputError(
+            f"extract {str(file)!r}: reading .pbf needs the package osmium: {EXTRA}"
+        ) from None
+    try:
+        for item in osmium.FileProcessor(str(file)):
+            yield _from_osmium(item)
+    except (RuntimeError, OSError) as error:
+        raise InputError(f"extract {str(file)!r}: not a .pbf extract: {error}") from error
+
+
+def _from_osmium(item: Any) -> Item:
+    """An item from osmium's, whose data is gone when the next one is read."""
+    tags = {tag.k: tag.v for tag in item.tags}
+    if item.is_node():
+        lat, lon = (f"{x:.{DIGITS}f}" for x in (item.location.lat, item.location.lon))
+        return Item("node", item.id, tags, lat, lon)
+    if item.is_way():
+        return Item("way", item.id, tags, refs=tuple(node.ref for node in item.nodes))
+    members = tuple((KINDS[m.type], m.ref, m.role) for m in item.members)
+    return Item("relation", item.id, tags, members=members)
+
+
+def _is_kept(item: Item, roads: RoadExtract) -> bool:
+    """Whether an item belongs to the roads: one of them, its nodes, a whole turn restriction."""
+    if item.kind == "node":
+        return item.id in roads.nodes
+    if item.kind == "way":
+        return item.id in roads.ways
+    kept = {"node": roads.nodes, "way": roads.ways}
+    return item.tags.get("type") == "restriction" and all(
+        ref in kept.get(kind, ()) for kind, ref, _ in item.members
+    )
+
+
+def _xml(item: Item) -> Iterator[str]:
+    """The lines of an item."""
+    place = f' lat="{item.lat}" lon="{item.lon}"' if item.kind == "node" else ""
+    yield f'<{item.kind} id="{item.id}"{place}>\n'
+    for ref in item.refs:
+        yield f'<nd ref="{ref}"/>\n'
+    for kind, ref, role in item.members:
+        yield f'<member type="{kind}" ref="{ref}" role={quoteattr(role)}/>\n'
+    for key, value in item.tags.items():
+        yield f"<tag k={quoteattr(key)} v={quoteattr(value)}/>\n"
+    yield f"</{item.kind}>\n"
+
+
+def _note_hints(item: Item, hints: Counter[tuple[str, str]]) -> None:
+    """Count the tags that tell the side of the road or the country."""
+    for key, value in item.tags.items():
+        if key in ("driving_side", "addr:country", "is_in:country_code"):
+            hints[key, value] += 1
+        elif key in RULES and value[2:3] == ":":  # GB:nsl_single, DE:274.1
+            hints[key, value[:2]] += 1
+
+
+def _off_the_data(box: Box | None, bounds: Box | None) -> str:
+    """Why no road was found."""
+    if box is None or bounds is None:
+        return "none of its roads has a node in it: the extract is incomplete"
+    reach = ",".join(f"{x:.4f}" for x in bounds)
+    turned = (box[1], box[0], box[3], box[2])
+    swapped = all(
+        low <= x <= high
+        for low, x, high in zip(bounds[:2] * 2, turned, bounds[2:] * 2, strict=True)
+    )
+    hint = "; are latitude and longitude swapped?" if swapped else ""
+    asked = ",".join(f"{x:g}" for x in box)
+    return f"no road touches the box {asked}; the data is within {reach}{hint}"

@@ -1,0 +1,246 @@
+"""What a SUMO network offers a test: lanes, pavements, crossings, carriageway.
+
+Read with sumolib; ids are opaque and never parsed, lane 0 is not assumed to be for driving, and
+no side of the road is taken for granted.
+"""
+
+from __future__ import annotations
+
+import gzip
+import html
+import xml.sax
+import zlib
+from collections.abc import Iterator, Mapping, Sequence
+from pathlib import Path as FilePath
+from typing import Any
+from xml.etree import ElementTree
+
+import shapely
+import sumolib
+from shapely.geometry import LineString
+
+from cavsumo.errors import NetworkError, UnknownName
+from cavsumo.model.carriageway import Roads
+from cavsumo.model.polyline import Path, Point
+
+# Junction interiors leave slivers between the lanes that cross them; closing by this much [m]
+# makes the carriageway one surface without reaching over a kerb.
+CLOSING_M = 0.5
+
+
+class Network:
+    """A network file, read once.
+
+    Attributes:
+        file: where it came from.
+        net: the sumolib network.
+        root: the attributes of its <net>.
+        edges: its normal edges, in the order of their ids.
+    """
+
+    def __init__(self, file: FilePath, net: Any, root: Mapping[str, str]) -> None:
+        self.file = file
+        self.net = net
+        self.root = dict(root)
+        self.edges: list[Any] = sorted(
+            (e for e in net.getEdges() if is_normal(e)),
+            key=lambda e: str(e.getID()),
+        )
+        self._pavements: tuple[list[Any], shapely.STRtree] | None = None
+
+    def edge(self, edge_id: str) -> Any:
+        """The normal edge of that id; raises UnknownName with the nearest one."""
+        edges = {e.getID(): e for e in self.edges}
+        if edge_id not in edges:
+            raise UnknownName("edge", edge_id, edges, str(self.file))
+        return edges[edge_id]
+
+    def junction(self, junction_id: str) -> Any:
+        """The junction of that id; raises UnknownName with the nearest one."""
+        nodes = {n.getID(): n for n in self.net.getNodes() if n.getType() != "internal"}
+        if junction_id not in nodes:
+            raise UnknownName("junction", junction_id, nodes, str(self.file))
+        return nodes[junction_id]
+
+    @property
+    def left_hand(self) -> bool:
+        """Whether traffic keeps left."""
+        return self.root.get("lefthand") in ("true", "1")
+
+    def inside(self, function: str) -> list[Any]:
+        """The edges inside junctions with that function, in the order of the file."""
+        edges = self.net.getEdges(withInternal=True)
+        return [edge for edge in edges if edge.getFunction() == function]
+
+    def crossings(self) -> list[Any]:
+        """The pedestrian crossings, which are edges inside junctions."""
+        return self.inside("crossing")
+
+    def crossed_by(self, crossing: Any) -> list[str]:
+        """Ids of the edges that a crossing leads over."""
+        return [str(edge.getID()) for edge in crossing.getCrossingEdges()]
+
+    def crossed_edges(self) -> set[str]:
+        """Ids of the edges that a pedestrian crossing leads over."""
+        return {edge for crossing in self.crossings() for edge in self.crossed_by(crossing)}
+
+    def crossing_surface(self) -> shapely.Geometry:
+        """The surface of the marked pedestrian crossings."""
+        return shapely.union_all(
+            lane_areas([lane for edge in self.crossings() for lane in edge.getLanes()])
+        )
+
+    def pavements(self) -> Iterator[Any]:
+        """The lanes for pedestrians only, along the edges, in the order of their ids."""
+        for edge in self.edges:
+            yield from (lane for lane in edge.getLanes() if is_pavement(lane))
+
+    def pavements_near(self, line: LineString, reach_m: float) -> list[Any]:
+        """The pavements within a distance of a line [m], in the order of their ids."""
+        if self._pavements is None:
+            lanes = list(self.pavements())
+            self._pavements = lanes, shapely.STRtree([LineString(lane_shape(p)) for p in lanes])
+        lanes, tree = self._pavements
+        return [lanes[i] for i in sorted(tree.query(line, "dwithin", reach_m).tolist())]
+
+    def roads(self) -> Roads:
+        """The carriageways, junctions included, and the axes of driving lanes and pavements."""
+        driving = [lane for edge in self.edges for lane in driving_lanes(edge)]
+        inside = [lane for edge in self.inside("internal") for lane in driving_lanes(edge)]
+        surface = shapely.union_all(lane_areas(driving + inside))
+        closed = surface.buffer(CLOSING_M, join_style="mitre").buffer(
+            -CLOSING_M, join_style="mitre"
+        )
+        axes = [[LineString(lane_shape(p)) for p in ps] for ps in (driving, self.pavements())]
+        return Roads(closed.simplify(0.01), *axes)
+
+
+def read_network(file: FilePath, *, foes: bool = False) -> Network:
+    """Read a .net.xml or .net.xml.gz; raises NetworkError in one sentence when it is none.
+
+    ``foes``: with the tables of who gives way to whom, which take long on large networks.
+    """
+    if file.is_dir():
+        raise NetworkError(f"network {str(file)!r}: is a folder, expected a .net.xml")
+    if not file.is_file():
+        raise NetworkError(f"network {str(file)!r}: no such file{_neighbours(file)}")
+    root = _root(file)
+    try:
+        net = sumolib.net.readNet(
+            str(file),
+            withInternal=True,
+            withPedestrianConnections=True,
+            withPrograms=True,
+            withFoes=foes,
+            lxml=False,
+        )
+    except (xml.sax.SAXParseException, EOFError, zlib.error) as error:
+        raise NetworkError(
+            f"network {str(file)!r}: not well-formed XML: {_one_line(error)}"
+        ) from error
+    except (xml.sax.SAXException, LookupError, ValueError, TypeError, AttributeError, OSError) as e:
+        raise NetworkError(f"network {str(file)!r}: cannot be read: {_one_line(e)}") from e
+    network = Network(file, net, root)
+    if not any(driving_lanes(edge) for edge in network.edges):
+        raise NetworkError(f"network {str(file)!r}: holds no lane on which a car may drive")
+    return network
+
+
+def street(edge: Any) -> str:
+    """The name of an edge's street, empty for none."""
+    return html.unescape(str(edge.getName() or ""))  # netconvert escapes what is escaped
+
+
+def is_normal(edge: Any) -> bool:
+    """Whether an edge is a road, not the inside of a junction."""
+    return edge.getFunction() in ("", "connector")
+
+
+def driving_lanes(edge: Any) -> list[Any]:
+    """The lanes of an edge on which a passenger car may drive, rightmost first."""
+    return [lane for lane in edge.getLanes() if lane.allows("passenger")]
+
+
+def is_pavement(lane: Any) -> bool:
+    """Whether a lane is for pedestrians and not for cars."""
+    return bool(lane.allows("pedestrian") and not lane.allows("passenger"))
+
+
+def pavement_walk(edge: Any) -> tuple[str, ...]:
+    """Ids of an edge and of another one with a pavement that begins at its end, if any.
+
+    A person whose walk leads on through a junction survives ``moveToXY`` there; one whose walk
+    ends with its edge crashes SUMO.
+    """
+    back = {
+        e.getID() for e in edge.getToNode().getOutgoing() if e.getToNode() is edge.getFromNode()
+    }
+    onward = sorted(
+        (e.getID() in back, str(e.getID()))
+        for e in edge.getToNode().getOutgoing()
+        if is_normal(e) and any(is_pavement(lane) for lane in e.getLanes())
+    )
+    return (str(edge.getID()), *(edge_id for _, edge_id in onward[:1]))
+
+
+def lane_shape(lane: Any) -> list[Point]:
+    """The axis of a lane [m]."""
+    return [(float(p[0]), float(p[1])) for p in lane.getShape()]
+
+
+def lane_path(lanes: Sequence[Any]) -> Path:
+    """The centre line through lanes that follow each other."""
+    return Path(point for lane in lanes for point in lane_shape(lane))
+
+
+def lane_areas(lanes: Sequence[Any]) -> list[shapely.Geometry]:
+    """The surfaces of lanes, all at once for speed; ValueError when one has none."""
+    for lane in lanes:
+        if not float(lane.getWidth()) > 0.0:
+            raise ValueError(f"lane {lane.getID()!r} has the width {lane.getWidth()}")
+        if len(lane.getShape()) < 2:
+            raise ValueError(f"lane {lane.getID()!r} has a shape of fewer than two points")
+    if not lanes:
+        return []
+    axes = [LineString(lane_shape(lane)) for lane in lanes]
+    halves = [float(lane.getWidth()) / 2 for lane in lanes]
+    return list(shapely.buffer(axes, halves, cap_style="flat", join_style="mitre"))
+
+
+def interior(network: Network, link: Any) -> list[Any]:
+    """The lanes inside a junction that a connection leads over."""
+    lanes: list[Any] = []
+    while link is not None and link.getViaLaneID():
+        via = network.net.getLane(link.getViaLaneID())
+        lanes.append(via)
+        onward = via.getOutgoing()
+        link = onward[0] if onward else None
+    return lanes
+
+
+def _root(file: FilePath) -> dict[str, str]:
+    """The attributes of a network's <net>; refuses what is not XML, or other XML."""
+    opener = gzip.open if file.suffix == ".gz" else open
+    try:
+        with opener(file, "rb") as stream:
+            _, root = next(ElementTree.iterparse(stream, events=("start",)))
+    except (ElementTree.ParseError, OSError, EOFError, zlib.error) as error:
+        raise NetworkError(f"network {str(file)!r}: not well-formed XML: {error}") from error
+    if root.tag != "net":
+        raise NetworkError(
+            f"network {str(file)!r}: a SUMO network begins with <net>, this file with <{root.tag}>"
+        )
+    return dict(root.attrib)
+
+
+def _neighbours(file: FilePath) -> str:
+    """Names the networks that lie where the missing one was looked for."""
+    if not file.parent.is_dir():
+        return ""
+    found = sorted(p.name for p in file.parent.glob("*.net.xml*"))
+    return f"; {str(file.parent)!r} holds {', '.join(found[:6])}" if found else ""
+
+
+def _one_line(error: BaseException) -> str:
+    """An exception as one line."""
+    return " ".join(f"{type(error).__name__}: {error}".split())

@@ -1,0 +1,106 @@
+"""Where tester vehicles start, and how fast: so that they can meet an ego that nothing hinders.
+
+The ego is expected to drive at the speed limit from its start. A vehicle that crosses its way is
+placed so that, unhindered too, it would arrive a little earlier: it can wait, but not hurry.
+"""
+
+from __future__ import annotations
+
+import math
+from collections import Counter
+from collections.abc import Sequence
+
+import numpy as np
+
+from cavsumo.errors import NetworkError
+from cavsumo.model.bodies import Kind
+from cavsumo.model.carriageway import Approach, Start
+from cavsumo.model.geometry import Box, gap
+
+EARLIER_S = (0.5, 3.0)  # by how much a crossing vehicle would arrive before the ego
+AHEAD_S = (2.0, 4.0)  # how far ahead of the ego the others start, in seconds of the ego's way
+CALM = (
+    0.6,
+    1.0,
+)  # speed of a vehicle that crosses or drives beside, as a share of what it may drive
+SLOW = (0.4, 0.7)  # speed of one ahead of the ego, which is to catch up with it
+BRAKING_MPS2 = 3.0  # a vehicle starts no faster than it can stop with this before it must wait
+APART_M = 3.0  # smallest gap between two bodies at the start
+ATTEMPTS = 100
+
+
+def draw_vehicles(
+    approaches: Sequence[Approach],
+    kinds: Sequence[Kind],
+    ego: Box,
+    start_speed: float | None,
+    rng: np.random.Generator,
+) -> tuple[Start, ...]:
+    """One start for each body, apart from each other and from the ego, on different approaches.
+
+    Every approach is as likely as any other, and comes a second time only when all have come or
+    are full. Consumes the generator.
+
+    Args:
+        ego: the ego's box at its start.
+        start_speed: of all vehicles [m/s]; None draws it.
+
+    Raises NetworkError when the bodies do not fit.
+    """
+    starts: list[Start] = []
+    boxes, used = [ego], Counter[Approach]()
+    for kind in kinds:
+        for attempt in range(ATTEMPTS):
+            approach = _choose(approaches, used, rng)
+            anywhere = attempt >= ATTEMPTS // 2  # better not in time than not at all
+            start = _draw(approach, kind, ego, start_speed, anywhere, rng)
+            box = Box(start.x, start.y, start.o, kind.length, kind.width)
+            if all(gap(box, other) > APART_M for other in boxes):
+                starts.append(start)
+                boxes.append(box)
+                used[approach] += 1
+                break
+        else:
+            raise NetworkError(f"no room for {len(kinds)} vehicles on their approaches: use fewer")
+    return tuple(starts)
+
+
+def _choose(
+    approaches: Sequence[Approach], used: Counter[Approach], rng: np.random.Generator
+) -> Approach:
+    """One of the approaches that came least often so far."""
+    least = min(used[a] for a in approaches)
+    # Where those are too short for another vehicle, any other will do.
+    left = [a for a in approaches if used[a] == least] if rng.random() < 0.9 else list(approaches)
+    return left[int(rng.integers(len(left)))]
+
+
+def _draw(
+    approach: Approach,
+    kind: Kind,
+    ego: Box,
+    start_speed: float | None,
+    anywhere: bool,
+    rng: np.random.Generator,
+) -> Start:
+    """A start on an approach, in time for the ego unless it may be anywhere."""
+    meets = math.isfinite(approach.wait)
+    top = min(kind.v_max, approach.speed)
+    if not meets:
+        top = min(top, approach.ego_speed)
+    v = float(rng.uniform(*(SLOW if approach.type == "following" else CALM))) * top
+    if start_speed is not None:
+        v = min(kind.v_max, start_speed)
+    until = approach.ego_enter / approach.ego_speed  # when the ego is there [s]
+    if meets:
+        until -= float(rng.uniform(*EARLIER_S))
+        along = min(approach.enter - v * until, approach.wait)
+    else:
+        lead = float(rng.uniform(*AHEAD_S)) * approach.ego_speed
+        along = approach.enter + lead + (ego.length + kind.length) / 2 - v * until
+    first, last = kind.length / 2, min(approach.wait, approach.path.length - kind.length / 2)
+    along = float(rng.uniform(first, last)) if anywhere else max(first, min(along, last))
+    if meets and start_speed is None:
+        v = min(v, math.sqrt(2.0 * BRAKING_MPS2 * max(0.0, approach.wait - along)))
+    x, y, o = approach.path.at(along)
+    return Start(x, y, o, approach=approach, v=v)

@@ -1,1 +1,0 @@
-"""An episode as one page for the browser, which needs nothing but itself."""

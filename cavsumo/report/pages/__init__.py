@@ -1,0 +1,1 @@
+"""Pages for the browser that need nothing but themselves: their frame, colours and script."""

@@ -1,0 +1,1 @@
+"""An episode as one page for the browser."""

@@ -1,0 +1,57 @@
+"""What the page draws over time: the ego's speed, the gap and the time to collision.
+
+* gap: the smallest distance between the ego's box and a tester's [m], 0 where they touch;
+* time to collision: gap / closing speed, the closing speed being that of the two centres along the
+  line between them; the smallest over the testers that come nearer, nothing where none does.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import Any, NamedTuple
+
+from cavsumo.model.geometry import Box, gap
+from cavsumo.results.traces import Shape
+
+CLOSING_MPS = 0.01  # slower than this nobody comes nearer
+
+
+class CurvePoint(NamedTuple):
+    """The curves at one timestep."""
+
+    speed: float  # of the ego [m/s]
+    gap: float | None  # None without testers [m]
+    ttc: float | None  # s
+
+
+def moment(frame: Mapping[str, Any], shapes: Mapping[str, Shape]) -> CurvePoint:
+    """The curves at a frame of a trace."""
+    ego = frame["ego"]
+    own = _box(ego, shapes["ego"])
+    near: list[tuple[float, float | None]] = []
+    for name, state in frame["testers"].items():
+        distance = gap(own, _box(state, shapes[name]))
+        near.append((distance, time_to_collision(distance, ego, state)))
+    times = [t for _, t in near if t is not None]
+    return CurvePoint(ego[2], min((d for d, _ in near), default=None), min(times, default=None))
+
+
+def time_to_collision(distance: float, ego: list[float], other: list[float]) -> float | None:
+    """Gap / closing speed along the line of centres [s]; None when they do not come nearer.
+
+    The states are [x, y, v, o].
+    """
+    dx, dy = other[0] - ego[0], other[1] - ego[1]
+    apart = math.hypot(dx, dy)
+    if distance == 0.0 or apart == 0.0:
+        return 0.0
+    vx = other[2] * math.cos(other[3]) - ego[2] * math.cos(ego[3])
+    vy = other[2] * math.sin(other[3]) - ego[2] * math.sin(ego[3])
+    closing = -(dx * vx + dy * vy) / apart
+    return distance / closing if closing > CLOSING_MPS else None
+
+
+def _box(state: list[float], shape: Shape) -> Box:
+    """The box of a body in a frame."""
+    return Box(state[0], state[1], state[3], shape.length, shape.width)

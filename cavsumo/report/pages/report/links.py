@@ -1,0 +1,151 @@
+"""Runs worth looking at: failures, one of each kind first, and some tests that the ego passed.
+
+The first of them are written as pages of their own, from their traces, without playing them again.
+"""
+
+from __future__ import annotations
+
+import shlex
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+import pandas
+
+from cavsumo.batch.replay import Record
+from cavsumo.errors import InputError
+from cavsumo.report.analysis import Report
+from cavsumo.report.load import Batch
+from cavsumo.report.pages.replay.page import write_page
+from cavsumo.report.pages.report.scenes import BatchPlace
+from cavsumo.results.reading import whole_lines
+from cavsumo.results.traces import read_trace
+
+FAILURES = 50  # are listed at most, or as many as are wanted as pages
+TESTS = 10  # passed tests are listed if none is wanted as a page
+
+
+@dataclass(frozen=True)
+class LinkedRun:
+    """A run worth looking at.
+
+    Attributes:
+        index: of its row in the evidence.
+        batch, run, agent, tester, setting: which one it is.
+        failed: whether the ego failed.
+        time, speed: when it was triggered or failed [s]; closing speed then [m/s], None if unknown.
+        alike: failures of its kind, itself included; None unless it is the first of them.
+        command: what plays it again.
+        page: the name of its page, empty without one.
+    """
+
+    index: int
+    batch: int
+    run: int
+    agent: str
+    tester: str
+    setting: str
+    failed: bool
+    time: float
+    speed: float | None
+    alike: int | None
+    command: str
+    page: str = ""
+
+
+def chosen(report: Report, pages: int) -> tuple[list[LinkedRun], list[LinkedRun]]:
+    """Failures and passed tests to be listed, those to be shown as pages first."""
+    rows = report.evidence.rows
+    settings = {int(i): group.setting for group in report.groups for i in group.rows.index}
+    failures, tests = (rows[rows["outcome"] == what] for what in ("violated", "held"))
+    alike = {(cell.file, cell.run): cell.count for cell in report.failures}
+    firsts = {key: rank for rank, key in enumerate(alike)}
+    keys = list(zip(failures["file"], failures["run"], strict=True))
+    order = sorted(range(len(keys)), key=lambda i: (firsts.get(keys[i], len(firsts)), i))
+    picked = failures.iloc[order[: max(FAILURES, pages)]]
+    spread = np.linspace(0, len(tests) - 1, min(len(tests), pages // 2 or TESTS))
+    return (
+        _looks(report, picked, settings, alike),
+        _looks(report, tests.iloc[np.round(spread).astype(int)], settings, {}),
+    )
+
+
+def _looks(
+    report: Report,
+    rows: pandas.DataFrame,
+    settings: Mapping[int, str],
+    alike: Mapping[tuple[str, int], int],
+) -> list[LinkedRun]:
+    """Rows as runs to look at."""
+    found = []
+    for row in rows.itertuples():
+        test, failed = report.tests[int(row.Index)], row.outcome == "violated"
+        event = test.impact if failed and test.impact is not None else test.trigger
+        run = int(row.run)
+        look = LinkedRun(
+            index=int(row.Index),
+            batch=int(row.batch),
+            run=run,
+            agent=row.agent,
+            tester=row.tester,
+            setting=settings[int(row.Index)],
+            failed=failed,
+            time=float(row.violation_time_s if failed else row.trigger_time_s),
+            speed=event.speed,
+            alike=alike.get((row.file, run)),
+            command=f"cavsumo replay {shlex.quote(row.file)} {run}",
+        )
+        found.append(look)
+    return found
+
+
+def with_pages(
+    looks: Sequence[LinkedRun], most: int, report: Report, scenes: Sequence[BatchPlace]
+) -> list[LinkedRun]:
+    """The same, the first of those that can be shown with names for their pages.
+
+    A page needs the trace, and the network as it was.
+    """
+    traced, several = report.evidence.rows["trace"], len(report.evidence.batches) > 1
+    here = {i for scene in scenes if scene.site is not None for i in scene.batches}
+    can = [look.index for look in looks if look.batch in here and traced[look.index]][:most]
+    return [
+        replace(look, page=_name(look, several)) if look.index in can else look for look in looks
+    ]
+
+
+def _name(look: LinkedRun, several: bool) -> str:
+    """The name of the page of a run."""
+    return f"{f'batch{look.batch + 1}-' if several else ''}run{look.run:06d}.html"
+
+
+def write_pages(
+    looks: Sequence[LinkedRun], batches: Sequence[Batch], scenes: Sequence[BatchPlace], folder: Path
+) -> None:
+    """Write the pages of those that have a name for it into a folder; raises InputError."""
+    wanted = [look for look in looks if look.page]
+    if not wanted:
+        return
+    try:
+        folder.mkdir(exist_ok=True)
+    except OSError as error:
+        raise InputError(f"--html: {str(folder)!r}: {error.strerror}") from error
+    for i in sorted({look.batch for look in wanted}):
+        scene = next(scene for scene in scenes if i in scene.batches)
+        here = {str(look.run): look for look in wanted if look.batch == i}
+        for _, row in whole_lines(batches[i].csv_file):
+            if row is not None and row["run"] in here:
+                _write_page(here[row["run"]], row, batches[i], scene, folder)
+
+
+def _write_page(
+    look: LinkedRun, row: Mapping[str, str], batch: Batch, scene: BatchPlace, folder: Path
+) -> None:
+    """Write the page of a run."""
+    assert scene.plan is not None
+    assert scene.site is not None
+    plan = batch.plan.model_copy(update={"scenario": scene.plan.scenario})
+    trace = read_trace(batch.csv_file.parent / row["trace"])
+    record = Record(plan, row, trace, batch.manifest, batch.csv_file)
+    write_page(record, trace, scene.site, folder / look.page)

@@ -1,0 +1,55 @@
+"""Where the batches of a report were played, as far as that is here to be shown."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+from cavsumo.batch.prepared import prepare
+from cavsumo.batch.replay import Record, located
+from cavsumo.errors import CavsumoError
+from cavsumo.model.scenario import BatchPlan
+from cavsumo.network.site import Site
+from cavsumo.report.load import Batch
+
+
+@dataclass(frozen=True)
+class BatchPlace:
+    """One place, of one or several batches.
+
+    Attributes:
+        name: of its network.
+        plan, site: the plan with its files where they are here, the network with the ego's route;
+            None when they are not here any more.
+        problem: why not, empty when they are.
+        batches: indices of its batches.
+    """
+
+    name: str
+    plan: BatchPlan | None
+    site: Site | None
+    problem: str
+    batches: list[int] = field(default_factory=list)
+
+
+def scenes(batches: Sequence[Batch]) -> list[BatchPlace]:
+    """The scenes of all batches, in their order; those of equal scenarios are one."""
+    found: dict[str, BatchPlace] = {}
+    for i, batch in enumerate(batches):
+        checksums = sorted(dict(batch.manifest.get("sha256") or {}).items())
+        key = repr((batch.plan.scenario, checksums))
+        if key not in found:
+            found[key] = _scene(batch)
+        found[key].batches.append(i)
+    return list(found.values())
+
+
+def _scene(batch: Batch) -> BatchPlace:
+    """Where a batch was played: the very files, known by their checksums."""
+    name = batch.plan.scenario.name
+    try:
+        record = Record(batch.plan, {}, None, batch.manifest, batch.csv_file)
+        plan = located(record, None, None).plan
+        return BatchPlace(name, plan, prepare(plan).site, "")
+    except CavsumoError as error:
+        return BatchPlace(name, None, None, str(error))

@@ -1,0 +1,84 @@
+"""What identifies the batch that results are of: its plan, files, versions, and SUMO's options."""
+
+from __future__ import annotations
+
+import hashlib
+import importlib.metadata
+import platform
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import Any
+
+from cavsumo import __version__
+from cavsumo.agents.casting import agent_files
+from cavsumo.assertions.specs import assertion_files
+from cavsumo.egos.specs import ego_files
+from cavsumo.errors import InputError
+from cavsumo.model.scenario import BatchPlan
+from cavsumo.network.site import Site
+
+# Settings that say how much of a batch to play and not what its episodes are.
+EXTENT = frozenset(
+    {"runs", "deadline_s", "first", "until_tests", "until_half_width", "until_rate", "budget_s"}
+)
+
+
+def checksums(plan: BatchPlan) -> dict[str, str]:
+    """The SHA-256 of every file that a plan names, those of its ego and assertions among them."""
+    scenario = plan.scenario
+    files = [scenario.net, *([scenario.routes] if scenario.routes else []), *scenario.additional]
+    files += [*agent_files(plan), *ego_files(scenario.ego)]
+    files += assertion_files(scenario.assertions)
+    return {str(file): checksum(file) for file in files}
+
+
+def checksum(file: Path) -> str:
+    """The SHA-256 of a file, which may be large."""
+    try:
+        with file.open("rb") as stream:
+            return hashlib.file_digest(stream, "sha256").hexdigest()
+    except OSError as error:
+        raise InputError(f"{str(file)!r}: cannot be read: {error.strerror}") from error
+
+
+def versions() -> dict[str, str]:
+    """The versions of what the results depend on."""
+    packages = ("libsumo", "sumolib", "numpy", "shapely")
+    return {"cavsumo": __version__, "python": platform.python_version()} | {
+        name: importlib.metadata.version(name) for name in packages
+    }
+
+
+def traffic_checksum(site: Site) -> dict[str, str]:
+    """The SHA-256 of the background traffic that was drawn, if any."""
+    if site.demand is None:
+        return {}
+    return {"traffic": hashlib.sha256(site.demand.encode()).hexdigest()}
+
+
+def differences(
+    first: Mapping[str, Any], second: Mapping[str, Any], *, apart: frozenset[str] = EXTENT
+) -> Iterator[str]:
+    """What makes two manifests those of different batches, in words, some settings apart."""
+    plans = [dict(m.get("plan") or {}) for m in (first, second)]
+    scenarios = [plan.pop("scenario", {}) for plan in plans]
+    for name, (was, is_) in (*unequal(*scenarios), *unequal(*plans)):
+        if name not in apart:
+            yield f"{name} was {was!r}, is {is_!r}"
+    yield from changes(first, second)
+
+
+def changes(recorded: Mapping[str, Any], now: Mapping[str, Any]) -> Iterator[str]:
+    """What changed around a plan that stayed the same: versions, files, SUMO's options."""
+    for part in ("versions", "sha256", "sumo_options"):
+        for name, (was, is_) in unequal(recorded.get(part) or {}, now[part]):
+            yield f"{part}: {name} was {was}, is {is_}"
+
+
+def unequal(
+    first: Mapping[str, Any], second: Mapping[str, Any]
+) -> Iterator[tuple[str, tuple[Any, Any]]]:
+    """The keys with different values, and the values; None where there is none."""
+    for key in {**first, **second}:
+        if first.get(key) != second.get(key):
+            yield key, (first.get(key), second.get(key))

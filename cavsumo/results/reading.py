@@ -1,0 +1,125 @@
+"""Results on disk, read: manifest and rows, with one sentence when they are damaged."""
+
+from __future__ import annotations
+
+import csv
+import json
+from collections.abc import Iterator
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from cavsumo.errors import ResultsError
+from cavsumo.results.columns import COLUMNS
+
+if TYPE_CHECKING:
+    import pandas
+
+FORMAT = "cavsumo-results-1"
+STARTING = "starting"  # a manifest that says so owns none of the rows that lie beside it
+COMPLETE = ("finished", "stopped", STARTING)  # the statuses of which no row would be missed
+HEADER = ",".join(COLUMNS) + "\n"
+
+
+def trace_name(csv_file: Path, run: int) -> str:
+    """Where the trace of an episode lies, relative to the results file."""
+    return f"{csv_file.stem}/run{run:06d}.jsonl"
+
+
+def ego_log_name(csv_file: Path, run: int) -> str:
+    """Where lies what the ego printed in an episode, relative to the results file."""
+    return f"{csv_file.stem}/run{run:06d}.ego.log"
+
+
+def read_manifest(csv_file: Path) -> dict[str, Any]:
+    """The manifest that belongs to a results file."""
+    file = csv_file.with_suffix(".json")
+    try:
+        data = json.loads(file.read_text(encoding="utf-8"))
+    except (OSError, ValueError) as error:
+        raise ResultsError(f"manifest {str(file)!r}: cannot be read: {error}") from error
+    if not isinstance(data, dict) or data.get("format") != FORMAT:
+        raise ResultsError(f"manifest {str(file)!r}: is not of the format {FORMAT}")
+    return data
+
+
+def check_replaceable(csv_file: Path) -> None:
+    """Raise ResultsError unless a new batch may take the place of what lies there."""
+    name, file = f"results {str(csv_file)!r}", csv_file.with_suffix(".json")
+    rows = csv_file.is_file() and csv_file.stat().st_size > 0
+    if not rows and not file.exists():
+        return
+    try:
+        status = read_manifest(csv_file)["status"]
+    except (ResultsError, KeyError) as error:
+        there = csv_file.name if rows else file.name
+        raise ResultsError(
+            f"{name}: {there!r} is there and not a batch of cavsumo; --overwrite replaces it"
+        ) from error
+    if rows and status not in COMPLETE:
+        raise ResultsError(
+            f"{name}: an unfinished batch ({status}); --resume goes on, --overwrite starts again"
+        )
+
+
+def read_rows(csv_file: Path) -> list[dict[str, str]]:
+    """The rows of a results file, as text."""
+    return list(rows_of(csv_file))
+
+
+def rows_of(csv_file: Path) -> Iterator[dict[str, str]]:
+    """The rows of a results file one by one, as text; the columns must be ours."""
+    try:
+        with csv_file.open(encoding="utf-8", newline="") as stream:
+            reader = csv.DictReader(stream)
+            missing = [column for column in COLUMNS if column not in (reader.fieldnames or ())]
+            if missing:
+                raise ResultsError(f"results {str(csv_file)!r}: no column {missing[0]!r}")
+            yield from reader
+    except (OSError, UnicodeDecodeError, csv.Error) as error:
+        raise ResultsError(f"results {str(csv_file)!r}: cannot be read: {error}") from error
+
+
+def whole_lines(csv_file: Path) -> Iterator[tuple[bytes, dict[str, str] | None]]:
+    """The complete lines of a results file with their rows, None for the header.
+
+    A torn last line is left out; any other damage raises ResultsError with the line's number.
+    """
+    name = f"results {str(csv_file)!r}"
+    try:
+        stream = csv_file.open("rb")
+    except OSError as error:
+        raise ResultsError(f"{name}: cannot be read: {error.strerror}") from error
+    with stream:
+        for number, line in enumerate(stream, 1):
+            if not line.endswith(b"\n"):
+                return
+            if number > 1:
+                yield line, _parsed(line, f"{name}: line {number}")
+            elif line == HEADER.encode("utf-8"):
+                yield line, None
+            else:
+                raise ResultsError(f"{name}: line 1 does not hold the columns of cavsumo")
+
+
+def _parsed(line: bytes, place: str) -> dict[str, str]:
+    """A line as a row."""
+    try:
+        cells = next(csv.reader([line.decode("utf-8")]))
+    except (UnicodeDecodeError, csv.Error, StopIteration) as error:
+        raise ResultsError(f"{place} is damaged") from error
+    if len(cells) != len(COLUMNS):
+        raise ResultsError(f"{place} has {len(cells)} cells, expected {len(COLUMNS)}")
+    row = dict(zip(COLUMNS, cells, strict=True))
+    if not row["run"].isdecimal():
+        raise ResultsError(f"{place} begins with {row['run']!r}, expected the number of a run")
+    return row
+
+
+def read_results(csv_file: Path) -> pandas.DataFrame:
+    """The rows as a pandas table, numbers as numbers."""
+    import pandas
+
+    try:
+        return pandas.read_csv(csv_file)
+    except (OSError, ValueError) as error:
+        raise ResultsError(f"results {str(csv_file)!r}: cannot be read: {error}") from error

@@ -1,0 +1,80 @@
+"""What an episode leaves: its row in the CSV, and the trace beside it as text.
+
+Both are made where the episode was played, so that the process that collects them only writes.
+"""
+
+from __future__ import annotations
+
+import csv
+import io
+import json
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from cavsumo.assertions.base import HELD, VIOLATED
+from cavsumo.results.columns import COLUMNS
+
+Row = dict[str, Any]
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """One finished episode.
+
+    Attributes:
+        row: its row, by column.
+        trace: the frames worth keeping as JSON lines, empty for none.
+        ego_log: what an ego from outside printed, which may differ from run to run; mostly empty.
+    """
+
+    row: Row
+    trace: str = ""
+    ego_log: str = ""
+
+    @property
+    def frames(self) -> list[dict[str, Any]]:
+        """The frames of the trace (parsed anew at each call)."""
+        return [json.loads(line) for line in self.trace.splitlines()[1:]]
+
+
+def cell(value: Any) -> str:
+    """A value as it stands in the CSV: empty for nothing, floats to three decimals.
+
+    Line breaks become spaces: a row is a line, so a torn one shows.
+    """
+    if value is None or value == "":
+        return ""
+    if isinstance(value, float):
+        return "" if not math.isfinite(value) else f"{value:.3f}".replace("-0.000", "0.000")
+    return " ".join(str(value).splitlines())
+
+
+def row_line(row: Mapping[str, Any]) -> str:
+    """A row as a line of the CSV, with its end."""
+    line = io.StringIO()
+    cells = [cell(row.get(column)) for column in COLUMNS]
+    csv.writer(line, lineterminator="\n").writerow(cells)
+    return line.getvalue()
+
+
+def verdicts_cell(verdicts: Mapping[str, str]) -> str:
+    """What every assertion said, as it stands in the CSV."""
+    return " ".join(f"{name}={verdict}" for name, verdict in verdicts.items())
+
+
+def verdicts_of(row: Mapping[str, Any]) -> dict[str, str]:
+    """What every assertion said of an episode; nothing where that was not recorded."""
+    said = str(row.get("verdicts") or "").split()
+    return {name: verdict for name, _, verdict in (word.rpartition("=") for word in said)}
+
+
+def is_test(row: Mapping[str, Any]) -> bool:
+    """Whether the precondition was triggered: a test in the seed's sense."""
+    return row["outcome"] in (HELD, VIOLATED)
+
+
+def is_failure(row: Mapping[str, Any]) -> bool:
+    """Whether the ego violated an assertion in this episode."""
+    return bool(row["outcome"] == VIOLATED)

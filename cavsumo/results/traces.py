@@ -1,0 +1,203 @@
+"""Traces: what happened in an episode, and all that is needed to play it again elsewhere.
+
+JSON lines. The first is the head: the row, the plan, what the agents knew before, the checksums of
+the files, the versions, and the boxes of all bodies. Then one frame a timestep. The head holds
+nothing that says how much of a batch was played, so a trace is the same in every shard.
+"""
+
+from __future__ import annotations
+
+import itertools
+import json
+import math
+import re
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from cavsumo.errors import ResultsError
+from cavsumo.model.bodies import Body
+from cavsumo.model.scenario import BatchPlan
+from cavsumo.model.snapshot import BodyState, Snapshot
+from cavsumo.network.site import Site
+from cavsumo.results.columns import COLUMNS
+from cavsumo.results.provenance import EXTENT, checksums, traffic_checksum, versions
+from cavsumo.results.rows import Row, cell
+from cavsumo.sumo.options import OPTIONS
+
+FORMAT = "cavsumo-trace-1"
+FRAME_KEYS = {"step", "time_s", "ego", "steering", "testers", "background"}
+# Columns that a replay does not reproduce: real time, and the file beside the row.
+NOT_REPLAYED = ("wall_s", "trace")
+# Settings that say how a batch is played and kept and not what its episodes are; what is known is
+# the memory in the head.
+MANNER = EXTENT | {"shard", "trace", "reset", "known"}
+MEMORY_MOST = 100_000  # characters of what an agent knew; one that knew more is not kept
+
+
+class Shape(NamedTuple):
+    """The box of a body."""
+
+    kind: str
+    length: float  # m
+    width: float  # m
+    wheelbase: float  # m
+
+
+@dataclass(frozen=True)
+class Trace:
+    """An episode as it was recorded.
+
+    Attributes:
+        head: all but the frames, see ``trace_head``.
+        frames: one a timestep, see ``frame``.
+    """
+
+    head: Mapping[str, Any]
+    frames: Sequence[Mapping[str, Any]]
+
+    @property
+    def row(self) -> dict[str, str]:
+        """The row of the episode as text, without what no replay reproduces."""
+        return dict(self.head["row"])
+
+    def shapes(self) -> dict[str, Shape]:
+        """The boxes of all bodies by their ids."""
+        return {
+            name: Shape(*entry["box"]) for entry in self.head["bodies"] for name in entry["ids"]
+        }
+
+
+def origin(plan: BatchPlan, site: Site) -> dict[str, Any]:
+    """What the episodes of a plan have in common, for the heads of their traces."""
+    return {
+        "plan": plan.model_dump(mode="json", exclude=set(MANNER)),
+        "sha256": checksums(plan) | traffic_checksum(site),
+        "versions": versions(),
+        "sumo_options": dict(OPTIONS),
+    }
+
+
+def trace_head(
+    origin: Mapping[str, Any], row: Row, memory: Any, snapshots: Iterable[Snapshot]
+) -> dict[str, Any]:
+    """The first line of a trace.
+
+    Args:
+        origin: see the function of that name.
+        memory: what the agents knew before; left out, and said so, when it is large.
+    """
+    known = len(json.dumps(memory)) <= MEMORY_MOST
+    return {
+        "format": FORMAT,
+        "row": {c: cell(row.get(c)) for c in COLUMNS if c not in NOT_REPLAYED},
+        **origin,
+        "memory": memory if known else None,
+        "memory_kept": known,
+        "bodies": _bodies(snapshots),
+    }
+
+
+def _bodies(snapshots: Iterable[Snapshot]) -> list[dict[str, Any]]:
+    """Everybody in the order of appearance, those with the same box together."""
+    met: dict[str, Body] = {}
+    for snapshot in snapshots:
+        for body in (snapshot.ego.body, *(t.body for t in snapshot.testers)):
+            met.setdefault(body.id, body)
+        for raw in snapshot.raw_background:
+            met.setdefault(raw[0].id, raw[0])
+    alike: dict[Shape, list[str]] = {}
+    for name, (_, kind) in met.items():
+        shape = Shape(kind.name, kind.length, kind.width, kind.wheelbase)
+        alike.setdefault(shape, []).append(name)
+    return [{"box": list(shape), "ids": names} for shape, names in alike.items()]
+
+
+def frame(snapshot: Snapshot) -> dict[str, Any]:
+    """A snapshot as one line of a trace: every body as [x, y, v, o], in full precision."""
+    return {
+        "step": snapshot.step,
+        "time_s": snapshot.time,
+        "ego": _pose(snapshot.ego),
+        "steering": snapshot.ego_steering,
+        "testers": {t.id: _pose(t) for t in snapshot.testers},
+        "background": {b.id: _pose(b) for b in snapshot.background},
+        "lights": "".join(snapshot.lights),
+    }
+
+
+def _pose(state: BodyState) -> list[float]:
+    return [state.x, state.y, state.v, state.o]
+
+
+def states(frame: Mapping[str, Any]) -> Iterator[tuple[str, str, list[float]]]:
+    """Everybody in a frame: part (ego, tester or background), id and [x, y, v, o]."""
+    yield "ego", "ego", frame["ego"]
+    for part, key in (("tester", "testers"), ("background", "background")):
+        for name, state in frame[key].items():
+            yield part, name, state
+
+
+def trace_text(head: Mapping[str, Any], frames: Iterable[Mapping[str, Any]]) -> str:
+    """A trace as JSON lines."""
+    return "".join(json.dumps(line, allow_nan=False) + "\n" for line in (head, *frames))
+
+
+def read_trace(file: Path) -> Trace:
+    """The trace in a file; raises ResultsError in one sentence."""
+    try:
+        return parsed(file.read_text(encoding="utf-8"))
+    except OSError as error:
+        raise ResultsError(f"trace {str(file)!r}: cannot be read: {error.strerror}") from error
+    except (ValueError, TypeError, AttributeError) as error:
+        raise ResultsError(f"trace {str(file)!r}: cannot be read: {error}") from error
+
+
+def parsed(text: str) -> Trace:
+    """The trace that a text holds; raises ValueError and the like when it holds none."""
+    first, *lines = text.splitlines() or [""]
+    found = json.loads(first)
+    if not (isinstance(found, dict) and found.get("format") == FORMAT):
+        raise ValueError(f"line 1 is not the head of a {FORMAT}")
+    return Trace(found, [_frame(line) for line in lines])
+
+
+def read_moments(file: Path, times: Sequence[float]) -> list[tuple[float, dict[str, Any]]]:
+    """For each time [s] the nearest frame of a trace, and how far the ego has driven by then [m].
+
+    Only those frames are parsed as a whole: traces are long, and a report reads thousands.
+    """
+    try:
+        with file.open(encoding="utf-8") as stream:
+            lines = stream.readlines()[1:]  # the first is the head
+        passing = list(map(_passing, lines))
+        steps = (math.dist(a[1:], b[1:]) for a, b in itertools.pairwise(passing))
+        driven = list(itertools.accumulate(steps, initial=0.0))
+        nearest = [min(range(len(lines)), key=lambda i: abs(passing[i][0] - t)) for t in times]
+        return [(driven[i], _frame(lines[i])) for i in nearest]
+    except (OSError, ValueError, TypeError) as error:
+        raise ResultsError(f"trace {str(file)!r}: cannot be read: {error}") from error
+
+
+_POSE = re.compile(r'"time_s":\s*([^,]+),\s*"ego":\s*\[([^,]+),([^,]+),')
+
+
+def _passing(line: str) -> tuple[float, float, float]:
+    """The time [s] and the ego's position [m] in a line of a trace."""
+    found = _POSE.search(line)
+    if found is None:
+        raise ValueError("a frame without time_s and ego, one after the other")
+    time, x, y = map(float, found.groups())
+    return time, x, y
+
+
+def _frame(line: str) -> dict[str, Any]:
+    """A line of a trace."""
+    found: dict[str, Any] = json.loads(line)
+    if not set(found) >= FRAME_KEYS:
+        raise ValueError(f"a frame without {', '.join(sorted(FRAME_KEYS - set(found)))}")
+    for _, name, state in states(found):
+        if len(state) != 4 or not all(isinstance(value, int | float) for value in state):
+            raise ValueError(f"step {found['step']}: {name} is {state!r}, expected [x, y, v, o]")
+    return found

@@ -1,0 +1,272 @@
+"""Results on disk, written so that whatever happens, what stands there is whole.
+
+The results file is locked while a batch writes it. Every row is one write, its trace (and what the
+ego printed) is there before it, and the manifest is replaced as a whole. A process that is killed
+leaves at most one torn row at the end, which ``resume`` takes off again; a full disk leaves none.
+"""
+
+from __future__ import annotations
+
+import errno
+import fcntl
+import json
+import os
+from collections.abc import Iterator, Mapping
+from contextlib import suppress
+from io import FileIO
+from itertools import chain
+from pathlib import Path
+from typing import Any
+
+from cavsumo.errors import BatchError, ResultsError
+from cavsumo.results.columns import COLUMNS
+from cavsumo.results.reading import (
+    FORMAT,
+    HEADER,
+    STARTING,
+    check_replaceable,
+    ego_log_name,
+    trace_name,
+    whole_lines,
+)
+from cavsumo.results.rows import Outcome, Row, row_line
+
+RUNNING = "running"
+UNENCODABLE = "backslashreplace"  # file names may hold what is no Unicode
+
+
+class Recorder:
+    """Writes a batch: manifest first and last, rows as they come; a context manager.
+
+    Entering locks the results file and changes nothing; then either ``begin`` or ``resume``.
+
+    Attributes:
+        traces: how many rows have a trace.
+    """
+
+    def __init__(self, csv_file: Path) -> None:
+        if csv_file.suffix != ".csv":  # the manifest and the traces take the other names
+            raise ResultsError(f"results {str(csv_file)!r}: expected a name that ends in .csv")
+        self.csv_file = csv_file
+        self.manifest_file = csv_file.with_suffix(".json")
+        self.trace_folder = csv_file.with_suffix("")
+        self.traces = 0
+        self.manifest: dict[str, Any] = {}
+        self._begun = False
+
+    def __enter__(self) -> Recorder:
+        self._created = not self.csv_file.exists()
+        self._file = _locked(self.csv_file)
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        if self._created and not self._begun:  # nothing was begun: leave nothing behind
+            self.csv_file.unlink(missing_ok=True)
+        self._file.close()
+
+    def begin(self, manifest: Mapping[str, Any], *, overwrite: bool = False) -> None:
+        """Start a batch in place of a finished one; raises ResultsError if that fails.
+
+        What is not finished, or not ours, is only overwritten when asked for.
+        """
+        if not overwrite:
+            check_replaceable(self.csv_file)
+        try:
+            self.manifest = dict(manifest)
+            self._write_manifest(STARTING)
+            self._begun = True
+            self._file.truncate(0)
+            self._remove_traces(after=-1)
+            self._start_rows()
+        except OSError as error:
+            raise ResultsError(
+                f"results {str(self.csv_file)!r}: cannot be written: {error.strerror}"
+            ) from error
+
+    def resume(self, manifest: Mapping[str, Any], todo: Iterator[int]) -> Iterator[dict[str, str]]:
+        """Go on behind the rows that are there, yielding them; call until exhausted.
+
+        Args:
+            manifest: the recorded one, with what has changed since.
+            todo: the numbers of the batch's episodes in order; left behind the last one done.
+        """
+        if manifest.get("status") != STARTING:
+            yield from self._whole_rows(todo)
+        try:
+            self._begun = True
+            self.manifest = {k: v for k, v in manifest.items() if k not in _FRAME}
+            self._file.truncate(self._size)
+            self._remove_traces(after=self._last)
+            self._start_rows()
+        except OSError as error:
+            raise ResultsError(
+                f"results {str(self.csv_file)!r}: cannot be written: {error.strerror}"
+            ) from error
+
+    _size, _last = 0, -1  # bytes of whole rows; the last episode among them
+    _has_folder = False  # whether there may be files beside the rows
+
+    def write(self, outcome: Outcome) -> Row:
+        """Append a row, its trace first; raises BatchError when the disk takes no more."""
+        row = self._with_trace(outcome)
+        line = _line(row)
+        try:
+            _write_all(self._file, line)
+        except OSError as error:
+            self._file.truncate(self._size)
+            raise self._no_more(error) from error
+        self._size += len(line)
+        self._last = row["run"]
+        return row
+
+    def replace(self, outcomes: Mapping[int, Outcome]) -> None:
+        """Put other rows in the place of some, all at once or not at all."""
+        rows = {run: self._with_trace(outcome) for run, outcome in outcomes.items()}
+        new_file = self.csv_file.with_name(f".{self.csv_file.name}.new")
+        new_file.unlink(missing_ok=True)
+        new = _locked(new_file)
+        try:
+            with self.csv_file.open("rb") as old, new_file.open("wb") as stream:
+                stream.write(old.readline())
+                for line in old:
+                    row = rows.get(int(line.split(b",", 1)[0]))
+                    stream.write(line if row is None else _line(row))
+                stream.flush()
+                os.fsync(stream.fileno())
+            new_file.replace(self.csv_file)
+        except OSError as error:
+            new.close()
+            new_file.unlink(missing_ok=True)
+            raise self._no_more(error) from error
+        self._file.close()
+        self._file = new
+        self._size = self.csv_file.stat().st_size
+
+    def checkpoint(self, facts: Mapping[str, Any]) -> None:
+        """Note facts in the manifest of the running batch."""
+        self.manifest.update(facts)
+        try:
+            self._write_manifest(RUNNING)
+        except OSError as error:
+            raise self._no_more(error) from error
+
+    def finish(self, status: str, facts: Mapping[str, Any]) -> None:
+        """Make the rows durable and complete the manifest."""
+        self.manifest.update(facts)
+        try:
+            os.fsync(self._file.fileno())
+            self._write_manifest(status)
+        except OSError as error:
+            raise self._no_more(error) from error
+
+    def _with_trace(self, outcome: Outcome) -> Row:
+        """The row, naming its trace if there is one; that and the ego's log are written."""
+        row, name = dict(outcome.row), trace_name(self.csv_file, outcome.row["run"])
+        self.traces -= self._put(name, outcome.trace)
+        self.traces += bool(outcome.trace)
+        self._put(ego_log_name(self.csv_file, row["run"]), outcome.ego_log)
+        return row | {"trace": name} if outcome.trace else row
+
+    def _put(self, name: str, text: str) -> bool:
+        """Write a file beside the rows, none if there is no text; whether one was there before."""
+        file = self.csv_file.parent / name
+        there = self._has_folder and file.exists()
+        if there:
+            file.unlink()
+        if text:
+            try:
+                self.trace_folder.mkdir(exist_ok=True)
+                file.write_text(text, encoding="utf-8")
+            except OSError as error:
+                with suppress(OSError):
+                    file.unlink()
+                raise self._no_more(error) from error
+            self._has_folder = True
+        return there
+
+    def _whole_rows(self, todo: Iterator[int]) -> Iterator[dict[str, str]]:
+        """The rows that are there, which must be those that the batch begins with."""
+        for line, row in whole_lines(self.csv_file):
+            if row is not None:
+                expected = next(todo, None)
+                if row["run"] != str(expected):
+                    due = f"run {expected} is due" if expected is not None else "the batch is over"
+                    raise ResultsError(
+                        f"results {str(self.csv_file)!r}: run {row['run']} where {due}"
+                    )
+                self._last = int(row["run"])
+                self.traces += bool(row["trace"])
+                yield row
+            self._size += len(line)
+
+    def _start_rows(self) -> None:
+        """Be ready for the next row, the header before the first."""
+        self._has_folder = self.trace_folder.is_dir()
+        if not self._size:
+            _write_all(self._file, HEADER.encode("utf-8"))
+            self._size = len(HEADER.encode("utf-8"))
+        self._write_manifest(RUNNING)
+
+    def _remove_traces(self, after: int) -> None:
+        """Remove the traces and logs of later episodes, and nothing else."""
+        if self.trace_folder.is_dir():
+            for old in chain(*map(self.trace_folder.glob, ("run*.jsonl", "run*.ego.log"))):
+                number = old.name.removeprefix("run").partition(".")[0]
+                if number.isdecimal() and len(number) >= 6 and int(number) > after:
+                    old.unlink()
+
+    def _write_manifest(self, status: str) -> None:
+        """Replace the manifest, all at once."""
+        data = {"format": FORMAT, "status": status, **self.manifest, "columns": dict(COLUMNS)}
+        text = json.dumps(data, indent=1, ensure_ascii=False, allow_nan=False)
+        new = self.manifest_file.with_name(f".{self.manifest_file.name}.new")
+        try:
+            new.write_text(text + "\n", encoding="utf-8", errors=UNENCODABLE)
+            new.replace(self.manifest_file)
+        except OSError:
+            new.unlink(missing_ok=True)
+            raise
+
+    def _no_more(self, error: OSError) -> BatchError:
+        """What to say when the disk takes no more."""
+        return BatchError(
+            f"results {str(self.csv_file)!r}: cannot be written: {error.strerror}; "
+            "the rows before are whole, --resume goes on from there"
+        )
+
+
+_FRAME = ("format", "status", "columns")  # what the recorder itself adds to a manifest
+
+
+def check_free(csv_file: Path) -> None:
+    """Raise ResultsError if another run is writing these results; changes nothing."""
+    if csv_file.is_file():
+        _locked(csv_file).close()
+
+
+def _locked(file: Path) -> FileIO:
+    """A file opened for writing, created if need be and locked until it is closed."""
+    try:
+        stream = file.open("ab", buffering=0)  # every row is one write at the end
+    except OSError as error:
+        raise ResultsError(f"results {str(file)!r}: cannot be written: {error.strerror}") from error
+    try:
+        fcntl.flock(stream, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except OSError as error:
+        stream.close()
+        if error.errno in (errno.EAGAIN, errno.EACCES):
+            raise ResultsError(f"results {str(file)!r}: another run is writing them") from error
+        raise ResultsError(f"results {str(file)!r}: no lock: {error.strerror}") from error
+    return stream
+
+
+def _line(row: Row) -> bytes:
+    """A row as it stands in the file."""
+    return row_line(row).encode("utf-8", errors=UNENCODABLE)
+
+
+def _write_all(file: FileIO, data: bytes) -> None:
+    """Write all of it; the system may take it in parts."""
+    left = memoryview(data)
+    while left:
+        left = left[file.write(left) :]

@@ -1,0 +1,91 @@
+"""What the tester spends and earns: the reward R of the seed's game, as a shortest path problem.
+
+Reaching the goal (the precondition of an assertion) is worth GOAL; time and time on the
+carriageway cost. Everything else, an unfair episode included, is worth nothing.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Container, Sequence
+
+from cavsumo.assertions.base import Judgement
+from cavsumo.model.scene import Scene
+from cavsumo.model.snapshot import BodyState, Snapshot
+
+GOAL = 100.0
+TIME_COST = 1.0  # per second and agent
+ROAD_COST = 1.0  # per second that a body's centre is on the carriageway
+Feedback = tuple[list[float], bool]  # each agent's reward for a timestep, and whether the game ends
+
+
+class RewardMonitor:
+    """The account of one episode.
+
+    Attributes:
+        cost: time that the testers' bodies spent on the carriageway, together [s].
+        total: the agents' rewards together, undiscounted.
+    """
+
+    def __init__(self, scene: Scene, teams: Sequence[Sequence[int]]) -> None:
+        self.cost = self.total = 0.0
+        self._dt, self._roads, self._teams = scene.dt, scene.roads, teams
+        self._over = False
+        self._names = {body.id for body in scene.bodies}
+        # Whether a body is on the carriageway, where that was looked up, and how far from there it
+        # cannot change; asking the map is dear, so it is asked no earlier.
+        self._on_road = [False] * len(scene.bodies)
+        self._known = [(math.inf, math.inf, 0.0)] * len(scene.bodies)
+        self._seen: tuple[BodyState, ...] = ()
+        self._waiting = [-self._dt * TIME_COST] * len(teams)  # with nobody on the road
+
+    def rewards(
+        self, successor: Snapshot, judgements: Sequence[Judgement], cheats: Container[str] = ()
+    ) -> Feedback | None:
+        """Each agent's reward for a timestep and whether the game ends; None once it is over.
+
+        ``cheats``: bodies that broke the rules of the world, who earn nothing by the goal.
+        """
+        testers, on_road = successor.testers, self._on_road
+        if testers is not self._seen:
+            self._seen = testers
+            for i, body in enumerate(testers):
+                x, y, leeway = self._known[i]
+                if math.hypot(body.x - x, body.y - y) >= leeway:
+                    self._look_up(i, body)
+        walking = True in on_road
+        if walking:
+            self.cost += self._dt * sum(on_road)
+        if self._over:
+            return None
+        rewards = self._waiting.copy()
+        if walking:
+            for a, team in enumerate(self._teams):
+                rewards[a] -= self._dt * ROAD_COST * sum([on_road[i] for i in team])
+        for judgement in judgements:
+            if judgement.tester in self._names:  # somebody reached the goal, or spoilt it
+                self._over = True
+                for a, team in enumerate(self._teams):
+                    names = [testers[i].id for i in team]
+                    fair = judgement.triggered and judgement.tester not in cheats
+                    if fair and judgement.tester in names:
+                        rewards[a] += GOAL
+        self.total += sum(rewards)
+        return rewards, self._over
+
+    def lost(self) -> Feedback | None:
+        """The last reward when the ego got away: a dead end for every agent."""
+        if self._over:
+            return None
+        self._over = True
+        rewards = [-self._dt * TIME_COST for _ in self._teams]
+        self.total += sum(rewards)
+        return rewards, True
+
+    def _look_up(self, i: int, body: BodyState) -> None:
+        """Note whether a body's centre is on the carriageway."""
+        if self._roads is None:
+            self._known[i] = (body.x, body.y, math.inf)
+            return
+        self._on_road[i] = self._roads.contains(body.x, body.y)
+        self._known[i] = (body.x, body.y, self._roads.edge_distance(body.x, body.y))
