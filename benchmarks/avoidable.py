@@ -53,6 +53,7 @@ def played(ego: str, reference: str, options: argparse.Namespace, folder: Path) 
         "net": ROOT / "networks" / "crossing.net.xml",
         "ego": ego,
         "agents": AGENTS,
+        "params": {"random.between": "repeat"},  # who wanders about is the hardest to judge
         "runs": options.runs,
         "reference": reference,
         "trace": "tests" if options.keep else "none",

@@ -48,7 +48,7 @@ SETTINGS = {
     "step_length": 0.02,
     "end": 16.66,
     "trace": "none",
-    "params": {"rate_per_s": 0.603, "election.rule": "unsigned"},
+    "params": {"rate_per_s": 0.603, "random.between": "repeat", "election.rule": "unsigned"},
 }
 AGENTS = ("random", "programmed-random", "proximity", "election")
 THEIRS = {"programmed-random": "constrained random"}  # where they call it otherwise

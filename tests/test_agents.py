@@ -12,10 +12,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from cavsumo.agents import AGENTS, Agent, Scene
+from cavsumo.agents.behaviours import Walker
 from cavsumo.errors import InputError
 from cavsumo.model.bodies import KINDS, NOOP, Action, Body, clamped, model_of
 from cavsumo.model.kinematics import step_floats
-from cavsumo.model.snapshot import Snapshot
+from cavsumo.model.snapshot import BodyState, Snapshot
 
 State = tuple[float, float, float, float]
 MakeScene = Callable[..., Scene]
@@ -101,6 +102,8 @@ def test_random_repeats_its_last_action_or_does_nothing(
     for between in ("repeat", "noop"):
         (agent,) = cast(scene, "random", epsilon=0.1, between=between)
         chosen[between] = [agent.choose_action(snapshot)[0] for _ in range(500)]
+    (listed,) = cast(scene, "random", epsilon=0.1)  # Algorithm 2 as it is listed
+    assert [listed.choose_action(snapshot)[0] for _ in range(500)] == chosen["noop"]
     last = NOOP
     for repeated, drawn in zip(chosen["repeat"], chosen["noop"], strict=True):
         last = last if drawn == NOOP else drawn
@@ -229,30 +232,53 @@ def test_a_tie_is_drawn_by_the_coordinator(straight_scene: MakeScene, scene_snap
 
 @pytest.mark.parametrize("teams", [None, [(0, 1), (2, 3)]])
 def test_one_crosses_at_a_time_and_then_the_nearest_ahead(
-    straight_scene: MakeScene, scene_snapshot: See, teams: Any
+    straight_scene: MakeScene, scene_snapshot: See, monkeypatch: pytest.MonkeyPatch, teams: Any
 ) -> None:
     """While one crosses nobody else does, whoever owns them; then the nearest ahead is next."""
     places = [(30.0, SOUTH, 0.0), (35.0, NORTH, math.pi), (45.0, SOUTH, 0.0), (55.0, SOUTH, 0.0)]
     scene = straight_scene(places)
     agents = cast(scene, "election", teams=teams, idle="noop", distance_m=60.0)
     states: list[State] = [(x, y, 0.0, o) for x, y, o in places]
-    before: set[int] = set()
     chosen: list[int] = []
+    begin = Walker.begin
+
+    def noted(walker: Walker, state: BodyState) -> bool:
+        chosen.append(walker.index)
+        return begin(walker, state)
+
+    monkeypatch.setattr(Walker, "begin", noted)
     for step in range(300):
-        ego_x = 10.0 + 0.2 * step
+        ego_x, before = 10.0 + 0.2 * step, len(chosen)
         snapshot = scene_snapshot(scene, (ego_x, 2.0), states, step=step)
         joint = [action for agent in agents for action in agent.choose_action(snapshot)]
         # Who walks straight across does nothing special, but is not aligned with the road.
         going = {i for i, a in enumerate(joint) if a != NOOP or abs(math.sin(states[i][3])) > 1e-6}
         assert len(going) <= 1, "two at once"
-        if going - before:
+        if chosen[before:]:
             ahead = {s[0] - ego_x: i for i, s in enumerate(states) if s[0] > ego_x}
-            assert going == {ahead[min(ahead)]}
-            chosen += going
-        before = going
+            assert going == {ahead[min(ahead)]} == set(chosen[before:])
         states = following(snapshot, joint, scene.dt)
     assert len(chosen) >= 3
     assert len(set(chosen)) >= 2
+
+
+@pytest.mark.parametrize("order", [(0, 1), (1, 0)])
+def test_who_arrives_leaves_the_election_open_in_the_same_timestep(
+    straight_scene: MakeScene, scene_snapshot: See, order: tuple[int, int]
+) -> None:
+    """Algorithm 5 falls through as Algorithm 4 does, whoever of the two is asked first."""
+    places = [(30.0, SOUTH, 0.0), (30.3, SOUTH, 0.0)]
+    scene = straight_scene(places)
+    agents: Any = cast(scene, "election", teams=[(i,) for i in order], idle="noop")
+    states: list[State] = [(x, y, 0.0, o) for x, y, o in places]
+    crossing: list[list[int]] = []
+    for step in range(400):
+        snapshot = scene_snapshot(scene, (10.0, 0.1), states, step=step)
+        chosen = {a.owned[0]: a.choose_action(snapshot)[0] for a in agents}
+        crossing.append([a.owned[0] for a in agents if a.behaviours[0].active])
+        states = following(snapshot, [chosen[0], chosen[1]], scene.dt)
+    assert all(len(going) == 1 for going in crossing)
+    assert {going[0] for going in crossing} == {0, 1}
 
 
 @pytest.mark.parametrize(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import builtins
 import json
 import math
 from collections.abc import Callable, Sequence
@@ -260,3 +261,35 @@ def test_learn_is_a_truth_value(value: object) -> None:
     """``learn=no`` is refused rather than read as yes."""
     with pytest.raises(InputError, match="learn"):
         AGENTS.make("q-learning", {"learn": value})
+
+
+def test_what_is_learned_does_not_depend_on_how_python_adds(
+    straight_scene: MakeScene, scene_snapshot: See, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Since Python 3.12 the built-in sum compensates the rounding of floats, before it does not."""
+    scene = straight_scene([(60.0, -5.15, 0.0), (57.3, -5.15, 0.0), (71.9, 5.15, math.pi)])
+    rng = np.random.default_rng(4)
+    seen = [
+        scene_snapshot(scene, (10.0 + 0.37 * i, float(rng.uniform(3.0, 9.0))), step=i)
+        for i in range(60)
+    ]
+
+    def plain(values: Any, start: Any = 0) -> Any:
+        for value in values:
+            start = start + value
+        return start
+
+    def compensated(values: Any, start: Any = 0) -> Any:
+        found = list(values)
+        floats = bool(found) and all(isinstance(value, float) for value in found)
+        return math.fsum([start, *found]) if floats else plain(found, start)
+
+    learned = []
+    for addition in (plain, compensated):
+        monkeypatch.setattr(builtins, "sum", addition)
+        agent = learner(scene, (0, 1, 2), alpha=0.1, epsilon=0.4, gamma=0.97)
+        life(agent, seen, [-0.1, -0.3, 0.7] * 19, terminal=True)
+        learned.append(agent.recall())
+    monkeypatch.undo()
+    assert learned[0] == learned[1]
+    assert any(value not in (0.0, 2.0) for value in learned[0]["weights"].values())

@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 import math
 from collections.abc import Callable, Iterator, Sequence
+from itertools import pairwise
 from random import Random
 from typing import Any
 
@@ -238,6 +239,37 @@ def test_timing_by_hand(straight_scene: MakeScene) -> None:
     assert min(goes) == pytest.approx(23.99943, abs=0.011)
     assert 25.5 < max(goes) < 26.27756
     assert len(goes) == round((max(goes) - min(goes)) / 0.01) + 1
+
+
+def test_a_trigger_that_holds_where_the_behaviour_ends_begins_it_at_once(
+    straight_scene: MakeScene,
+) -> None:
+    """Algorithm 4, line 3: after the terminator the trigger is asked in the same timestep."""
+    scene = straight_scene([(50.0, SOUTH, 0.0)])
+    agent: Any = AGENTS.make("proximity", {"distance_m": 500.0})
+    walk = played(scene, agent, (50.0, SOUTH, 1.4, 0.0), (50.0, LANE, 0.0, 0.0), 40.0)
+    next(walk)  # as it is before the first action
+    sides = []
+    for snapshot in walk:
+        assert agent.behaviours[0].active
+        sides.append(snapshot.testers[0].y > 0.0)
+    assert sum(a != b for a, b in pairwise(sides)) >= 3, "it never crosses back"
+
+
+def test_where_the_behaviour_ends_and_nothing_triggers_no_action_is_chosen(
+    straight_scene: MakeScene,
+) -> None:
+    """Algorithm 4, last line: in the very timestep in which the terminator holds."""
+    scene = straight_scene([(50.0, SOUTH, 0.0)])
+    agent: Any = AGENTS.make("proximity", {"distance_m": 20.0})
+    first = (50.0, SOUTH, 1.4, 0.0)
+    ends = []
+    for snapshot in played(scene, agent, first, (45.0, LANE, 6.0, 0.0), 20.0):
+        over = agent.behaviours[0].active and agent.behaviours[0].over(snapshot.testers[0])
+        if over:
+            ends.append(agent.choose_action(snapshot))
+            assert not agent.behaviours[0].active
+    assert ends == [(NOOP,)]
 
 
 # At the kerb --------------------------------------------------------------------------------------

@@ -6,6 +6,7 @@ import dataclasses
 import itertools
 import math
 import sys
+import textwrap
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -14,18 +15,21 @@ import pytest
 from support import rows
 
 from cavsumo.agents.base import Agent
+from cavsumo.assertions.contacts import Contact
 from cavsumo.batch.episode_runner import EpisodeRunner
 from cavsumo.batch.executors import Means
 from cavsumo.batch.jobs import job
 from cavsumo.cli import main
 from cavsumo.cli.commands.run import Manner, run
 from cavsumo.egos import make_ego
-from cavsumo.egos.base import Ego
+from cavsumo.egos.base import EGO_KIND, Ego
 from cavsumo.egos.reference import REFERENCES
+from cavsumo.egos.reference.encounter import encounter
 from cavsumo.egos.reference.takeover import Takeover
-from cavsumo.model.bodies import Action
+from cavsumo.model.bodies import PEDESTRIAN, Action, Body
 from cavsumo.model.carriageway import Start
 from cavsumo.model.scenario import BatchPlan
+from cavsumo.model.snapshot import BodyState, Snapshot
 from cavsumo.network.site import Site
 from cavsumo.report.analysis import analyse
 from cavsumo.simulation.avoidability import (
@@ -52,15 +56,15 @@ def played(staged: Staged, monkeypatch: pytest.MonkeyPatch) -> Any:
     open_stages: list[Setup] = []
 
     def one(
-        start: Start, ego: Ego | None = None, agent: Agent | None = None, **asserted: Any
+        *starts: Start, ego: Ego | None = None, agent: Agent | None = None, **asserted: Any
     ) -> AvoidabilityCheck:
         asserted = asserted or {"assertions": ["collision"]}
-        plan, site = staged("pedestrians", testers=1, end=20.0, **asserted)
+        plan, site = staged("pedestrians", testers=len(starts), end=20.0, **asserted)
         ego = ego or make_ego("constant", {"speed": SPEED})
-        monkeypatch.setattr(Site, "draw", lambda *_: (start,))
+        monkeypatch.setattr(Site, "draw", lambda *_: starts)
         setup = make_setup(plan.scenario, site, ego)
         open_stages.append(setup)
-        agents = [agent or Agent()]
+        agents = [agent or Agent() for _ in setup.teams]
         episode = play(setup, agents, 1, keep=True)
         assert episode.judgement.verdict == "violated"
         return AvoidabilityCheck(setup, agents, 1, False, episode, lambda: None)
@@ -72,12 +76,7 @@ def played(staged: Staged, monkeypatch: pytest.MonkeyPatch) -> Any:
 
 def judged(retrial: AvoidabilityCheck, name: str) -> Avoidability:
     """The verdict of one reference driver."""
-    fresh = AvoidabilityCheck.__new__(
-        AvoidabilityCheck
-    )  # the assertion that was violated has been used since
-    for field in dataclasses.fields(AvoidabilityCheck):
-        object.__setattr__(fresh, field.name, getattr(retrial, field.name))
-    return fresh.judged(REFERENCES.make(name, {}))
+    return retrial.judged(REFERENCES.make(name, {}))
 
 
 def standing(x: float = 60.0) -> Start:
@@ -155,6 +154,37 @@ def test_every_timestep_by_itself_gives_the_same_last_chance(played: Played) -> 
     assert NOT_MONOTONE not in found.note
 
 
+def test_a_stage_may_play_other_episodes_before_the_judgement(played: Played) -> None:
+    """A violation is judged by what it was, not by what the assertions say of a later episode."""
+    first = played(standing(40.0))
+    before = judged(first, "ideal")
+    again = AvoidabilityCheck(first.setup, first.agents, 1, False, first.episode, lambda: None)
+    assert judged(again, "ideal") == before
+
+
+def test_who_wanders_about_in_the_lane_is_a_risk_from_the_beginning(played: Played) -> None:
+    """In plain view for six seconds, mostly as if to leave the ego's strip in time.
+
+    It walks on a circle of half a metre in the middle of the lane. Once that looks like a collision
+    for as long as a driver evaluates it, no human could stop any more.
+    """
+
+    class Circling(Agent):
+        def choose_action(self, snapshot: Any) -> tuple[Action, ...]:
+            return (Action(0.0, 0.6),)
+
+    retrial = played(Start(55.0, LANE_Y - 0.5, 0.0, v=WALK), agent=Circling())
+    scene = retrial._scene()
+    met = [encounter(scene, f, f.testers[0]) for f in retrial.episode.frames[: retrial.end + 1]]
+    assert all(m.in_way for m in met)
+    found = judged(retrial, "human")
+    assert found.avoidable is True
+    assert found.last_chance is not None
+    lasts = 1 + max(i for i, m in enumerate(met) if not m.conflict)  # on a course of collision
+    assert lasts * DT > found.last_chance
+    assert REFERENCES.make("human", {}).perceived(met, DT) == 0
+
+
 def test_the_testers_do_again_what_they_did(played: Played) -> None:
     """A counterfactual changes the ego only: agents are not asked, and learn nothing."""
 
@@ -211,6 +241,48 @@ def test_an_ego_that_is_never_the_same_is_not_judged(played: Played) -> None:
     found = judged(played(standing(), ego=Moody()), "human")
     assert found.avoidable is None
     assert found.note == "not judged: the episode again is another one: the ego differs at 0.10 s"
+
+
+def test_whom_the_original_touched_before_the_takeover_is_not_held_against_the_driver() -> None:
+    """Only contacts of the moving ego that begin after it, in the timestep of the takeover none."""
+    ego = BodyState(Body("ego", EGO_KIND), 0.0, 0.0, SPEED, 0.0)
+    other = BodyState(Body("tester0", PEDESTRIAN), 2.5, 0.0, 0.0, 0.0)
+    verdicts = []
+    for step in (3, 7, 8):
+        watch = ContactWatch(7)
+        watch.reset(None)  # type: ignore[arg-type]  # of pedestrians it asks no scene
+        seen = Snapshot(step, step * DT, ego, 0.0, (other,))
+        watch.observe(seen, [Contact(step * DT, ego, other)])
+        verdicts.append(watch.judgement.verdict)
+    assert verdicts == ["not_triggered", "not_triggered", "violated"]
+
+
+def test_an_earlier_contact_leaves_a_later_failure_preventable(
+    played: Played, controller: Callable[..., str]
+) -> None:
+    """An ego that drove through somebody before, whom the assertion does not mean, can still stop.
+
+    Takeovers after that contact avoid the violation, as they do where there was none.
+    """
+    source = """
+        from cavsumo.assertions.base import VIOLATED, Assertion, Judgement
+
+        class Second(Assertion):
+            def observe(self, snapshot, contacts):
+                for contact in contacts:
+                    if contact.a is snapshot.ego and contact.b.id == "tester1":
+                        self.judgement = Judgement(
+                            self.name, VIOLATED, "tester1", 0.0, contact.time,
+                            impact_speed=contact.closing_speed,
+                        )
+                        self.decided = True
+        """
+    name = controller(textwrap.dedent(source), "second_one")
+    starts = standing(25.0), standing()
+    found = judged(played(*starts, assertions=[f"{name}:Second"]), "ideal")
+    assert found.avoidable is True
+    assert found.margin == pytest.approx(way_to_stop("ideal") / SPEED, abs=2 * DT)
+    assert found.note == ""
 
 
 def test_sumos_driver_obeys_from_the_takeover_on(staged: Staged) -> None:

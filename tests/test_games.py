@@ -97,7 +97,10 @@ def test_regions_and_solvability_of_a_vector(name: str) -> None:
     assert [states for states, _ in found] == [s for s, _ in expected["end_components_max_gain"]]
     for (_, value), (_, known) in zip(found, expected["end_components_max_gain"], strict=True):
         assert value == pytest.approx(known, abs=1e-8)
-    assert literally_solvable(game) == expected["solvable"]["A_seed_min_over_pi2"]
+    assert literally_solvable(game, literal=False) == expected["solvable"]["A_seed_min_over_pi2"]
+    if literally_solvable(game):
+        assert literal
+        assert expected["solvable"]["A_seed_min_over_pi2"]
 
 
 @pytest.mark.parametrize("name", LISTED)
@@ -241,6 +244,18 @@ def test_a_cycle_without_cost_is_found_among_rewards_of_both_signs() -> None:
         assert round_ == ([None, None, 0] if not solvable else [-math.inf, -math.inf, 0])
         assert literally_solvable(game) == solvable
     assert solve(game).lower == pytest.approx([-4, -6, 0], abs=1e-6)
+
+
+def test_literally_solvable_takes_proper_to_the_letter() -> None:
+    """Half back, half on: the only policy reaches the goal almost surely, within no time."""
+    half = from_transitions(2, [1], [(0, 0, 0, [(0, "1/2", "-1"), (1, "1/2", "-1")])])
+    assert literally_solvable(half) is False
+    assert literally_solvable(half, literal=False) is True
+    straight = (0, 1, 0, [(1, 1, -3)])
+    both = from_transitions(2, [1], [(0, 0, 0, [(0, "1/2", "-1"), (1, "1/2", "-1")]), straight])
+    assert literally_solvable(both) is False  # an improper policy earns -2
+    stays = from_transitions(2, [1], [(0, 0, 0, [(0, 1, -1)]), straight])
+    assert literally_solvable(stays) is True  # an improper policy earns minus infinity
 
 
 def test_a_limit_that_is_never_taken_is_refused() -> None:

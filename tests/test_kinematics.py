@@ -354,3 +354,36 @@ def test_a_straight_path_has_no_centre(steering):
     with pytest.raises(ValueError, match="centre of rotation") as raised:
         centre_of_rotation([0, 0, 1, 0], steering, wheelbase=3.0)
     assert not isinstance(raised.value, CavsumoError)
+
+
+EXTREMES = [0.0, 5e-324, 1e-300, 1.0, 1e155, 1e300, 1.7e308]
+
+
+@pytest.mark.parametrize("v", EXTREMES)
+@pytest.mark.parametrize("place", [*EXTREMES, -1.7e308])
+def test_no_step_has_a_result_that_is_not_finite(v, place):
+    """Whatever finite numbers: a finite answer, or ValueError; the array and the floats alike."""
+    cases = ((dt, e, t) for dt in (1e-300, 0.1, 10.0, 1.7e308) for e in (0.0, 0.6, -1.5)
+             for t in (0.0, -1.7e308, 1.7e308))  # fmt: skip
+    for dt, e, t in cases:
+        constants = {"wheelbase": 3.0, "v_min": 0.0, "v_max": 9.0, "dt": dt}
+        answers = []
+        for one in (lambda s, t, e, **c: step(s, t, e, **c),
+                    lambda s, t, e, **c: step_floats(*s, t, e, **c)):  # fmt: skip
+            try:
+                answers.append(np.array(one((place, -place, v, 1.0), t, e, **constants)))
+            except ValueError:
+                answers.append(None)
+        assert all(a is None or np.isfinite(a).all() for a in answers)
+        assert (answers[0] is None) == (answers[1] is None), (dt, e, t)
+
+
+def test_a_way_beyond_the_range_of_floats_is_refused():
+    """1e308 m/s for 10 s, straight on and on a circle."""
+    for e in (0.0, 0.3):
+        with pytest.raises(ValueError, match="must be finite"):
+            step((0.0, 0.0, 1e308, 0.0), 0.0, e, wheelbase=3.0, v_min=0.0, v_max=1e308, dt=10.0)
+        with pytest.raises(ValueError, match="must be finite" if not e else "domain"):
+            step_floats(0.0, 0.0, 1e308, 0.0, 0.0, e, 3.0, 0.0, 1e308, 10.0)
+    with pytest.raises(ValueError, match="turn angle must be finite"):
+        turn_angle(1e308, 0.3, wheelbase=3.0, dt=10.0)

@@ -150,13 +150,33 @@ def test_a_conflict_counts_when_it_lasts(met: Callable[..., Encounter]) -> None:
     leaving = met((12.0, 8.0), (30.0, LANE_Y, 1.4, NORTH))
     assert leaving.in_way
     assert not leaving.conflict
-    assert lasting_conflict([*[leaving] * 9, yes], 0.1) == 9
+    assert lasting_conflict([*[leaving] * 9, yes], 0.1) == 0  # in the lane, whatever it promises
+    assert lasting_conflict([*[leaving] * 9, *[no] * 5, yes], 0.1) == 14  # it has left
     assert lasting_conflict([*[yes] * 9, *[leaving] * 9, yes], 0.1) == 0  # never out of the lane
     assert lasting_conflict([*[yes] * 9, *[no] * 5], 0.1) is None  # it is over
     assert lasting_conflict([*[yes] * 9, *[no] * 5, *[yes] * 5], 0.1) == 14  # another one
     assert lasting_conflict([no, *[yes] * 5, *[no] * 4, *[yes] * 2], 0.1) == 1  # a short break
     assert driver("human").perceived([no, *[yes] * 6], 0.1) == 1
     assert driver("ideal").perceived([no, *[yes] * 6], 0.1) == 1
+
+
+@pytest.mark.parametrize(
+    ("tester", "in_way"),
+    [
+        ((30.0, LANE_Y, 1.4, NORTH), True),  # in the strip, however soon it will have left
+        ((30.0, LANE_Y - 1.4, 1.4, 0.0), True),  # on the carriageway 9 cm beside it
+        ((30.0, LANE_Y - 1.65, 0.0, 0.0), False),  # 34 cm beside it
+        ((30.0, LANE_Y + 1.45, 0.0, 0.0), True),  # 14 cm, towards the middle of the road
+        ((30.0, LANE_Y - 1.9, 0.0, NORTH), False),  # the pavement
+        ((15.0, LANE_Y, 9.0, 0.0), False),  # drives away faster
+        ((5.0, LANE_Y, 1.4, 0.0), False),  # behind
+    ],
+)
+def test_whom_the_ego_cannot_pass_is_in_its_way(
+    met: Callable[..., Encounter], tester: tuple[float, float, float, float], in_way: bool
+) -> None:
+    """Ahead, slower, and on the carriageway in the strip or within 0.3 m of it."""
+    assert met((12.0, 8.0), tester).in_way is in_way
 
 
 @pytest.mark.parametrize(

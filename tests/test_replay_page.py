@@ -11,15 +11,18 @@ import zipfile
 from pathlib import Path
 
 import pytest
+import shapely
 from hypothesis import given
 from hypothesis import strategies as st
+from shapely.geometry import LineString
 
 from cavsumo.batch.replay import Record
 from cavsumo.errors import InputError
+from cavsumo.model.carriageway import Roads
 from cavsumo.network.site import Site
-from cavsumo.report.pages.replay.curves import moment, time_to_collision
+from cavsumo.report.pages.replay.curves import moment, on_or_entering, time_to_collision
 from cavsumo.report.pages.replay.facts import marks, verdict
-from cavsumo.report.pages.replay.packing import columns, packed, shapes, unpacked
+from cavsumo.report.pages.replay.packing import NOTHING, columns, packed, shapes, unpacked
 from cavsumo.report.pages.replay.page import episode, page, write_page
 from cavsumo.results.traces import Shape, Trace
 
@@ -85,6 +88,43 @@ def test_the_nearest_and_the_soonest_count() -> None:
     assert found.gap == pytest.approx(2.5)
     assert found.ttc == pytest.approx(1.75)
     assert moment({"ego": [0, 0, 10, 0], "testers": {}}, BOX)[1:] == (None, None)
+
+
+@pytest.mark.parametrize(
+    ("other", "ttc"),
+    [
+        ([20, -2.5, 0, math.pi / 2], None),  # stands on the pavement, its front at the kerb
+        ([20, -2.5, 1.4, 0.0], None),  # walks along it
+        ([20, -4.5, 1.4, math.pi / 2], None),  # walks to the kerb, 1.5 s from it
+        ([20, -2.5, 1.4, math.pi / 2], 1.7),  # steps off it
+        ([20, -1.5, 0, 0.0], 1.7),  # stands on the carriageway
+        ([2.4, -1.5, 0, math.pi / 2], 0.0),  # touches the ego
+    ],
+)
+def test_who_stays_on_the_pavement_is_no_collision_to_come(
+    other: list[float], ttc: float | None
+) -> None:
+    """The time counts of those on the carriageway, here |y| < 2 m, and of those entering it."""
+    roads = Roads(shapely.box(-50, -2, 50, 2), [LineString([(-50, 0), (50, 0)])])
+    found = moment({"ego": [0, 0, 10, 0], "testers": {"a": other}}, BOX, roads)
+    assert found.gap is not None
+    assert found.ttc == (None if ttc is None else pytest.approx(ttc, abs=0.1))
+
+
+def test_the_page_asks_where_the_testers_are(shown: Shown) -> None:
+    """Along a kerb the graph has a time only while a tester is on the road or about to be."""
+    record, trace, site = shown
+    found = unpacked(episode(record, trace, site)["ttc"])
+    shapes_met = trace.shapes()
+    counting = [
+        any(on_or_entering(site.roads, s, shapes_met[n]) for n, s in frame["testers"].items())
+        for frame in trace.frames
+    ]
+    assert not all(counting)
+    assert all(
+        value == NOTHING for value, counts in zip(found, counting, strict=True) if not counts
+    )
+    assert any(value != NOTHING for value in found)
 
 
 def test_nobody_comes_nearer_to_himself() -> None:

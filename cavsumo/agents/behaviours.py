@@ -28,8 +28,14 @@ class Behaviour(Protocol):
     def begin(self, state: BodyState) -> bool:
         """Begin here and now; False where that is impossible."""
 
+    def over(self, state: BodyState) -> bool:
+        """The terminator psi: whether what is under way is done. Changes nothing."""
+
+    def end(self) -> None:
+        """Be inactive from now on."""
+
     def act(self, snapshot: Snapshot, state: BodyState) -> Action:
-        """The next action while active; ends the behaviour when it is done."""
+        """The next action while active and not over."""
 
     def timing(self, aim: float) -> Trigger:
         """The trigger that begins it as the ego's reaction zone arrives."""
@@ -84,6 +90,12 @@ class Walker:
             return False
         self._idle = DoNothing()  # beyond the road nothing of the start holds
         return True
+
+    def over(self, state: BodyState) -> bool:
+        return self._crossing.over(state)
+
+    def end(self) -> None:
+        self._crossing.end()
 
     def act(self, snapshot: Snapshot, state: BodyState) -> Action:
         return self._crossing.action(state)

@@ -61,9 +61,13 @@ class ElectionAgent(ProgrammedAgent):
         ahead = distance_ahead(snapshot, state)
         return ahead if ahead > 0.0 else None
 
-    def crossing_bodies(self) -> list[int]:
-        """The owned bodies that are crossing."""
-        return [j for j, b in zip(self.owned, self.behaviours, strict=True) if b.active]
+    def crossing_bodies(self, snapshot: Snapshot) -> list[int]:
+        """The owned bodies that are crossing and have not arrived."""
+        return [
+            j
+            for j, b in zip(self.owned, self.behaviours, strict=True)
+            if b.active and not b.over(snapshot.testers[j])
+        ]
 
 
 class Coordinator:
@@ -85,7 +89,7 @@ class Coordinator:
         return self._winner
 
     def _elect(self, snapshot: Snapshot) -> int | None:
-        if any(agent.crossing_bodies() for agent in self.agents):
+        if any(agent.crossing_bodies(snapshot) for agent in self.agents):
             return None
         votes = [
             (vote, j)

@@ -248,12 +248,17 @@ class Driver:
         self.active = self._begun = True
         return True
 
+    def over(self, state: BodyState) -> bool:
+        """Whether the manoeuvre has ended."""
+        return self.manoeuvre is not None and self.manoeuvre.over(state)
+
+    def end(self) -> None:
+        """Drive lawfully from now on."""
+        self.active = False
+
     def act(self, snapshot: Snapshot, state: BodyState) -> Action:
         """The next action of the manoeuvre."""
         assert self.manoeuvre is not None
-        if self.manoeuvre.over(state):
-            self.active = False
-            return self.idle(snapshot, state)
         return self.manoeuvre.act(state, everybody(snapshot, state, ego=False))
 
     def timing(self, aim: float) -> Trigger:

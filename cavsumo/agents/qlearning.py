@@ -13,7 +13,7 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, ClassVar
 
@@ -113,7 +113,7 @@ class QLearningAgent(Agent):
 
     def q_value(self, features: Sequence[float]) -> float:
         """The seed's QValue: the weighted sum of the features."""
-        return sum(w * f for w, f in zip(self.weights, features, strict=True))
+        return total(w * f for w, f in zip(self.weights, features, strict=True))
 
     def _decide(self, i: int, snapshot: Snapshot) -> tuple[int, list[float]]:
         """A target for one body, with its features: random, or the best with ties drawn."""
@@ -128,9 +128,11 @@ class QLearningAgent(Agent):
 
     def _update(self, successor: Snapshot, terminal: bool) -> None:
         """One step of gradient descent; the bodies' values add up to the agent's."""
-        future = 0.0 if terminal else sum(self._best(i, successor) for i in range(len(self.owned)))
+        future = (
+            0.0 if terminal else total(self._best(i, successor) for i in range(len(self.owned)))
+        )
         target = self._return + self._discount**self._held * future
-        joint = [sum(column) for column in zip(*(f for _, f in self._decided), strict=True)]
+        joint = [total(column) for column in zip(*(f for _, f in self._decided), strict=True)]
         error = target - self.q_value(joint)
         self.weights = [
             w + self._alpha * error * f for w, f in zip(self.weights, joint, strict=True)
@@ -140,6 +142,18 @@ class QLearningAgent(Agent):
         """The value of the best target for one body."""
         options = (self.features[i].values(snapshot, target) for target in range(len(TARGETS)))
         return max(self.q_value(f) for f in options)
+
+
+def total(values: Iterable[float]) -> float:
+    """The sum from left to right, rounded after each term.
+
+    The built-in ``sum`` compensates the rounding of floats since Python 3.12, so what is learned
+    with it differs in the last digits from one version to another.
+    """
+    found = 0.0
+    for value in values:
+        found += value
+    return found
 
 
 def load_weights(file: Path) -> list[float]:

@@ -1,4 +1,4 @@
-"""Algorithm 2 of the seed: now and then a random action."""
+"""Algorithm 2 of the seed: now and then a random action, else none."""
 
 from __future__ import annotations
 
@@ -34,18 +34,18 @@ class Exploration:
 
 @AGENTS.register("random")
 class RandomAgent(Agent):
-    """Algorithm 2: with probability epsilon a random action, else repeat it or do nothing."""
+    """Algorithm 2: with probability epsilon a random action, else none."""
 
     sees_background = False
 
     PARAMETERS: ClassVar[Mapping[str, str]] = {
         "rate_per_s": RATE_DOC,
         "epsilon": EPSILON_DOC,
-        "between": "'repeat' the last random action (CAV-Gym) or 'noop' (the seed)",
+        "between": "between two random actions 'noop' (the seed), or 'repeat' the last (CAV-Gym)",
     }
 
     def __init__(
-        self, rate_per_s: float = 0.6, epsilon: float | None = None, between: str = "repeat"
+        self, rate_per_s: float = 0.6, epsilon: float | None = None, between: str = "noop"
     ) -> None:
         self.exploration = Exploration(rate_per_s, epsilon)
         self.between = choice("between", between, ("repeat", "noop"))

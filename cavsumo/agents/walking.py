@@ -100,18 +100,30 @@ class CrossingWalk:
         self.prior = state.o
         return self.active
 
+    def over(self, state: BodyState) -> bool:
+        """The terminator psi: behind the far kerb, and turned back to the old orientation."""
+        return self._across(state) and abs(wrap(self.prior - state.o)) < ALIGNED_RAD
+
+    def end(self) -> None:
+        """Stop being active."""
+        self.crossing = None
+
     def action(self, state: BodyState) -> Action:
         """The next action while active; ends the behaviour when it has arrived."""
         assert self.crossing is not None
-        if not self.turning_back and self.crossing.progress(state.x, state.y) >= (
-            self.crossing.length
-        ):
-            self.turning_back = True
+        over, self.turning_back = self.over(state), self._across(state)
         heading = self.prior if self.turning_back else self.crossing.heading
         action = walk(state, heading, state.body.kind.v_max, self.scene.dt)
-        if self.turning_back and abs(wrap(heading - state.o)) < ALIGNED_RAD:
-            self.crossing = None
+        if over:
+            self.end()
         return action
+
+    def _across(self, state: BodyState) -> bool:
+        """Whether a body is, or was, at the end of the way across."""
+        if self.crossing is None:
+            return False
+        done = self.crossing.progress(state.x, state.y) >= self.crossing.length
+        return self.turning_back or done
 
 
 class Stroll:

@@ -9,7 +9,8 @@ from __future__ import annotations
 
 import math
 from collections import deque
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from itertools import pairwise
 from typing import ClassVar
 
 import numpy as np
@@ -18,16 +19,18 @@ from numpy.typing import NDArray
 from cavsumo.assertions.base import ASSERTIONS
 from cavsumo.assertions.contacts import STANDING_MPS
 from cavsumo.assertions.margin import Margin, MarginAssertion
+from cavsumo.assertions.metrics.encroachment import Moves, moves, spells
 from cavsumo.assertions.metrics.plane import drac_boxes, ttc_boxes
 from cavsumo.model.checks import number
-from cavsumo.model.geometry import Box, overlap
+from cavsumo.model.geometry import Box
 from cavsumo.model.scene import Scene
 from cavsumo.model.snapshot import BodyState, Snapshot
 
 Metric = Callable[..., NDArray[np.float64]]
+Moment = tuple[float, Box]  # where a body was when
 COURSE_S = 10.0  # who would meet the ego later than this is on no course of collision
 FIRM = 100.0  # m/s2; deceleration to avoid a contact that is there already
-CROSSING = math.cos(math.radians(30.0))  # ways that meet at less do not cross
+CROSSING_RAD = math.radians(30.0)  # ways that meet at less do not cross
 
 
 def _velocity(state: BodyState) -> tuple[float, float]:
@@ -104,10 +107,11 @@ class DracAssertion(MarginAssertion):
 class PetAssertion(MarginAssertion):
     """The ego and a tester cross the same place at least 2 s apart (Allen et al. 1978; SUMO's SSM).
 
-    Precondition: one of them comes to a place that the other left at most 10 s before, on a way
-    that crosses the other's by more than 30 degrees. Violated by a post-encroachment time below
+    Precondition: one of them enters an area that both sweep and that the other left at most 10 s
+    before, on ways that cross by at least 30 degrees. Violated by a post-encroachment time below
     ``least_s``. Robustness: smallest PET less ``least_s`` [s]. Bodies: testers. Whoever comes
-    second is not asked: a tester who steps in behind the ego counts as well.
+    second is not asked: a tester who steps in behind the ego counts as well. How far the area
+    reaches shows as the second drives on, so that the time can become less after it has entered.
     """
 
     name: ClassVar[str] = "pet"
@@ -120,38 +124,61 @@ class PetAssertion(MarginAssertion):
 
     def reset(self, scene: Scene) -> None:
         super().reset(scene)
-        self._tracks: dict[str, deque[tuple[float, Box]]] = {}
+        self._tracks: dict[str, deque[Moment]] = {}
+        self._inside: dict[tuple[str, str], tuple[float, float]] = {}
 
     def margins(self, snapshot: Snapshot, before: Snapshot | None) -> Iterator[Margin]:
-        now, ego = snapshot.time, snapshot.ego
-        self._note(now, ego)
+        ego = snapshot.ego
+        for state in (ego, *snapshot.testers):
+            self._note(snapshot.time, state)
         for tester in snapshot.testers:
-            self._note(now, tester)
-            met = [
-                self._last_there(ego.box, tester.id, now),
-                self._last_there(tester.box, ego.id, now),
-            ]
-            times = [now - t for t in met if t is not None]
+            found = self._pet(ego.id, tester.id), self._pet(tester.id, ego.id)
+            times = [time for time in found if time <= COURSE_S]
             if times:
                 yield tester.id, min(times) - self.least_s
 
     def _note(self, now: float, state: BodyState) -> None:
-        """Add to a body's track; while it stands only the last time counts."""
+        """Add to a body's track; of the time that it stands only the first and the last count."""
         track = self._tracks.setdefault(state.id, deque())
         box = state.box
-        if track and track[-1][1] == box:
+        if len(track) > 1 and track[-1][1] == track[-2][1] == box:
             track.pop()
         track.append((now, box))
-        while len(track) > 1 and track[0][0] < now - COURSE_S:
+        while len(track) > 2 and track[1][0] < now - COURSE_S:
             track.popleft()
 
-    def _last_there(self, box: Box, name: str, now: float) -> float | None:
-        """When a body was last where a box is now, on a way across it."""
-        x, y, o, length, width = box
-        for time, other in reversed(self._tracks.get(name, ())):
-            reach = 0.5 * (length + width + other.length + other.width)
-            if abs(other.x - x) > reach or abs(other.y - y) > reach:
-                continue
-            if abs(math.cos(other.heading - o)) < CROSSING and overlap(box, other):
-                return time if time >= now - COURSE_S else None
-        return None
+    def _pet(self, second: str, first: str) -> float:
+        """How long after one body left the area in which another is now that one entered it [s].
+
+        Infinite if it is in none that the other has left.
+        """
+        latest = list(self._tracks[second])[-2:]
+        past = _passing(latest, self._tracks[first])
+        met = spells(_moves(latest), _moves(past), CROSSING_RAD) if past else None
+        if met is None:
+            self._inside.pop((second, first), None)
+            return math.inf
+        entered, left = self._inside.get((second, first), (met.enters, -math.inf))
+        left = max(left, met.other_leaves)
+        self._inside[second, first] = entered, left
+        return max(0.0, entered - left)
+
+
+def _passing(latest: Sequence[Moment], track: Iterable[Moment]) -> list[Moment]:
+    """The part of a track, without gaps, outside of which nobody comes near the latest moments."""
+    (_, before), (_, box) = latest[0], latest[-1]
+    own = 0.5 * (box.length + box.width) + math.dist(before[:2], box[:2])
+    near = []
+    moments = list(track)
+    for i, ((_, one), (_, two)) in enumerate(pairwise(moments)):
+        reach = own + 0.5 * (one.length + one.width)
+        near_x = abs(one.x - box.x) <= reach + abs(two.x - one.x)
+        if near_x and abs(one.y - box.y) <= reach + abs(two.y - one.y):
+            near.append(i)
+    return moments[near[0] : near[-1] + 2] if near else []
+
+
+def _moves(moments: Sequence[Moment]) -> Moves:
+    """A piece of a track as the metrics have it."""
+    times, boxes = zip(*moments, strict=True)
+    return moves(times, boxes)

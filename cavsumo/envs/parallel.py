@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, ClassVar
@@ -151,7 +152,7 @@ class CavsumoParallelEnv(ParallelEnv[str, Vector, Any]):  # type: ignore[misc]
         seen = self._play.episodes.step(chosen)
         rewards = seen.rewards
         if self._zero_sum:
-            rewards[EGO] = -sum(reward for name, reward in rewards.items() if name != EGO)
+            rewards[EGO] = -math.fsum(reward for name, reward in rewards.items() if name != EGO)
         terminated = dict.fromkeys(self.agents, seen.terminated)
         truncated = dict.fromkeys(self.agents, seen.truncated)
         infos = self._infos(seen)

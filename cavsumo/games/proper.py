@@ -17,7 +17,7 @@ from cavsumo.games.evaluation import stationary_values
 from cavsumo.games.model import Game
 from cavsumo.games.policies import Stationary, ego_actions, pure, tester_actions
 from cavsumo.games.readings import Reading
-from cavsumo.games.regions import almost_sure_region
+from cavsumo.games.regions import almost_sure_region, sure_region
 
 Options = dict[int, list[set[int]]]  # for each state, the successors by each ego action
 
@@ -58,9 +58,14 @@ def sure_steps(game: Game, tester: Stationary) -> list[int | None]:
 
 def is_proper(game: Game, tester: Stationary, *, literal: bool = False) -> bool:
     """Whether the policy is proper at every state, to the letter or almost surely."""
+    return all(_proper_states(game, tester, literal))
+
+
+def _proper_states(game: Game, tester: Stationary, literal: bool) -> list[bool]:
+    """Where the policy is proper, to the letter or almost surely."""
     if literal:
-        return all(t is not None for t in sure_steps(game, tester))
-    return all(proper_states(game, tester))
+        return [t is not None for t in sure_steps(game, tester)]
+    return proper_states(game, tester)
 
 
 def _options(game: Game, tester: Stationary) -> Options:
@@ -78,21 +83,25 @@ def _options(game: Game, tester: Stationary) -> Options:
     return options
 
 
-def literally_solvable(game: Game, limit: int = 20_000) -> bool | None:
+def literally_solvable(game: Game, limit: int = 20_000, *, literal: bool = True) -> bool | None:
     """Solvable as the seed writes it, over pure stationary policies; None beyond the limit.
 
-    Some policy is proper almost surely (reading A), and every improper one has, at each state where
-    it is improper, an ego against which it earns minus infinity.
+    Some policy is proper (reading A), and every improper one has, at each state where it is
+    improper, an ego against which it earns minus infinity. A policy that reaches the goal almost
+    surely but within no number of steps is improper to the letter and earns a finite value, so it
+    makes a game unsolvable; unless ``literal`` is False, which takes it for proper.
     """
     live = np.flatnonzero(~game.goal).tolist()
     testers, egos = ([f(game, s) for s in live] for f in (tester_actions, ego_actions))
     if math.prod(map(len, testers)) * math.prod(map(len, egos)) > limit:
         return None
-    if not almost_sure_region(game, Reading.A).inside.all():
+    region = sure_region if literal else almost_sure_region
+    if not region(game, Reading.A).inside.all():
         return False
     for choice in itertools.product(*testers):
         tester = pure(dict(zip(live, choice, strict=True)))
-        improper = {s for s, proper in enumerate(proper_states(game, tester)) if not proper}
+        proper_at = _proper_states(game, tester, literal)
+        improper = {s for s, proper in enumerate(proper_at) if not proper}
         for reply in itertools.product(*egos) if improper else ():
             ego = pure(dict(zip(live, reply, strict=True)))
             found = stationary_values(game, tester, ego, exact=game.exact is not None)

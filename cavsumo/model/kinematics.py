@@ -20,8 +20,7 @@ It holds because the centre moves on a circle of radius (b / 2) / sin(beta): a c
 turn angle off the tangent, and the tangent is o + beta. The position uses the old speed v.
 
 The array functions check their input. `step_floats` and `steering_for_turn` serve one body in an
-inner loop: NumPy costs about ten times more there, so the two formulas stand here twice, and
-tests/test_kinematics.py holds the copies together.
+inner loop, where NumPy costs ten times more: tests/test_kinematics.py holds the copies together.
 """
 
 from __future__ import annotations
@@ -57,23 +56,24 @@ def step(
         dt: time step lambda [s], > 0.
 
     Returns:
-        The successor (x', y', v', o'), shape [..., 4].
+        The successor (x', y', v', o'), shape [..., 4]; always finite.
 
     Raises:
-        ValueError: an argument is not finite or outside its range, or shapes do not fit.
+        ValueError: an argument or the result is not finite or outside its range; unfit shapes.
     """
     x, y, v, o = _columns("state", state)
     t = _finite("throttle", throttle)
     if not 0.0 <= v_min <= v_max < math.inf:
         raise ValueError(f"need 0 <= v_min <= v_max < inf, got v_min={v_min}, v_max={v_max}")
     beta, theta = _angles(v, steering, wheelbase, dt)
-    half = 0.5 * theta
+    half, round_ = 0.5 * theta, _wrap(o + theta)
     # sin(half)/half without 0/0; the divisor 1 is never used where half is 0.
-    chord = v * dt * np.where(half == 0.0, 1.0, np.sin(half) / np.where(half == 0.0, 1.0, half))
-    course = o + beta + half
-    v_next = np.minimum(v_max, np.maximum(v_min, v + t * dt))
-    successor = (x + chord * np.cos(course), y + chord * np.sin(course), v_next, _wrap(o + theta))
-    return np.stack(np.broadcast_arrays(*successor), axis=-1)
+    with np.errstate(over="ignore", invalid="ignore"):
+        chord = v * dt * np.where(half == 0.0, 1.0, np.sin(half) / np.where(half == 0.0, 1.0, half))
+        course = o + beta + half
+        v_next = np.minimum(v_max, np.maximum(v_min, v + t * dt))
+        successor = (x + chord * np.cos(course), y + chord * np.sin(course), v_next, round_)
+    return _finite("successor", np.stack(np.broadcast_arrays(*successor), axis=-1))
 
 
 def inverse(
@@ -86,10 +86,9 @@ def inverse(
         t = (v' - v) / dt
         e = atan2(2 b theta, sqrt((2 v dt - b |theta|) (2 v dt + b |theta|)))
 
-    Only v and o are used: the positions are ignored and not checked against the action. The action
-    is one of several if the step clamped the speed (t is then the smallest in size) or turned the
-    body by more than pi (theta is then the principal value). The bounds of a particular body on
-    throttle and steering are the caller's to check.
+    The positions are ignored. The action is one of several if the step clamped the speed (t is then
+    the smallest in size) or turned the body by more than pi (theta is then the principal value).
+    The bounds of a particular body on throttle and steering are the caller's to check.
 
     Args:
         state: (x, y, v, o), shape [..., 4]; units m, m, m/s, rad.
@@ -118,15 +117,14 @@ def turn_angle(v: ArrayLike, steering: ArrayLike, *, wheelbase: float, dt: float
     """Return the turn angle theta = (2 v dt / b) sin(atan(tan(e) / 2)) in rad (seed, eq. 15).
 
     Args:
-        v: speed [m/s], shape [...].
-        steering: e [rad], |e| < pi/2; broadcasts with v.
+        v: speed [m/s], shape [...]; steering: e [rad], |e| < pi/2; broadcasts with v.
         wheelbase, dt: b [m] and time step [s], as in `step`.
 
     Returns:
         theta [rad], positive to the left, not wrapped, of the broadcast shape.
 
     Raises:
-        ValueError: an argument is not finite or outside its range.
+        ValueError: an argument, or the turn angle, is not finite or outside its range.
     """
     return _angles(_finite("v", v), steering, wheelbase, dt)[1]
 
@@ -147,9 +145,8 @@ def axles(state: ArrayLike, *, wheelbase: float) -> tuple[FloatArray, FloatArray
     """
     x, y, _, o = _columns("state", state)
     _positive(wheelbase=wheelbase)
-    centre = np.stack((x, y), axis=-1)
     arm = 0.5 * wheelbase * np.stack((np.cos(o), np.sin(o)), axis=-1)
-    return centre + arm, centre - arm
+    return np.stack((x, y), axis=-1) + arm, np.stack((x, y), axis=-1) - arm
 
 
 def centre_of_rotation(state: ArrayLike, steering: ArrayLike, *, wheelbase: float) -> FloatArray:
@@ -193,7 +190,7 @@ def step_floats(
 ) -> tuple[float, float, float, float]:
     """Return (x', y', v', o') for one body: `step` on plain floats, without checks.
 
-    Arguments, units, equations and result are those of `step` (seed, eqs 8-19).
+    Arguments, units and equations are those of `step`. ValueError if the result is not finite.
     """
     beta, half, chord = 0.0, 0.0, v * dt
     if steering:  # only to save time: without steering the formula gives just this
@@ -202,13 +199,16 @@ def step_floats(
         chord = v * dt * (math.sin(half) / half) if half else v * dt
     course = o + beta + half
     v_next = v + throttle * dt
-    # Comparisons, since min() and max() are calls and cost a quarter of the step.
+    # Comparisons, since calls (min, max, isfinite) cost a quarter of the step.
     v_next = v_min if v_next < v_min else v_next
     v_next = v_max if v_next > v_max else v_next
     o_next = o + 2.0 * half
     if not -math.pi < o_next <= math.pi:
         o_next = wrap(o_next)
-    return x + chord * math.cos(course), y + chord * math.sin(course), v_next, o_next
+    x_next, y_next = x + chord * math.cos(course), y + chord * math.sin(course)
+    if (x_next - x_next) + (y_next - y_next):  # NaN, unless both are finite
+        raise ValueError(f"the way of a body at v={v} m/s in {dt} s must be finite")
+    return x_next, y_next, v_next, o_next
 
 
 def steering_for_turn(v: float, turn: float, wheelbase: float, dt: float) -> float:
@@ -255,8 +255,8 @@ def _angles(
     e = _steering(steering)
     _positive(wheelbase=wheelbase, dt=dt)
     beta = np.arctan(0.5 * np.tan(e))
-    theta: FloatArray = 2.0 * (v * dt * np.sin(beta) / wheelbase)
-    return beta, theta
+    with np.errstate(over="ignore", invalid="ignore"):
+        return beta, _finite("turn angle", 2.0 * (v * dt * np.sin(beta) / wheelbase))
 
 
 def _finite(name: str, value: ArrayLike) -> FloatArray:

@@ -193,7 +193,7 @@ def _worth(movement: Movement, crossed: set[str]) -> tuple[Any, ...]:
     """Sort key: the best movement to test first."""
     into, out = movement.into, movement.out
     before = _upstream(into)
-    approach = sum(e.getLength() for e in before)
+    approach = math.fsum(e.getLength() for e in before)
     return (
         movement.direction != STRAIGHT,
         -sum(e.getID() in crossed for e in (into, out)),
@@ -234,7 +234,7 @@ def _downstream(edge: Any) -> list[Any]:
 def _prolonged(edge: Any, wanted: float, onward: Callable[[Any], list[Any]]) -> list[Any]:
     """Edges one after another until they are long enough together or the road ends."""
     chain = [edge]
-    while sum(e.getLength() for e in chain) < wanted:
+    while math.fsum(e.getLength() for e in chain) < wanted:
         candidates = [e for e in onward(chain[-1]) if e not in chain]
         if not candidates:
             break
@@ -260,7 +260,7 @@ def route_through(network: Network, movement: Movement, half_m: float) -> EgoRou
     while len(before) > 1 and _driven(network, before) - APPROACH_M >= before[0].getLength() - 1.0:
         before.pop(0)
     depart = max(half_m, _driven(network, before) - APPROACH_M)
-    surplus = sum(e.getLength() for e in after) - EXIT_M
+    surplus = math.fsum(e.getLength() for e in after) - EXIT_M
     arrive = max(1.0, float(after[-1].getLength()) - max(0.0, surplus))
     try:
         edges = [*before, *after]

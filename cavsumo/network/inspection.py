@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable
 from dataclasses import dataclass, field
 from typing import Any
@@ -43,7 +44,7 @@ class Way:
     @property
     def area_m(self) -> float:
         """Length of all starting areas together [m]."""
-        return sum(area.end - area.begin for area in self.areas)
+        return math.fsum(area.end - area.begin for area in self.areas)
 
 
 @dataclass(frozen=True)

@@ -82,7 +82,7 @@ def _times(count: int, duration: float, rng: np.random.Generator) -> list[float]
 
 def _count(rate: float, roads: Iterable[Road | Pavement], seconds: float) -> int:
     """How many set out on roads in some time, at a rate per minute and kilometre."""
-    return round(rate * sum(road.length for road in roads) / 1000.0 * seconds / 60.0)
+    return round(rate * math.fsum(road.length for road in roads) / 1000.0 * seconds / 60.0)
 
 
 # Cars

@@ -130,8 +130,8 @@ def _links(network: Network, route: EgoRoute) -> Iterator[tuple[Any, Any]]:
 
 def arrival(legs: Sequence[tuple[float, float]], pace: Pace) -> float:
     """When an unhindered ego has come to the end of the legs [s]."""
-    way = sum(length for length, _ in legs)
-    free = sum(length / max(0.1, min(limit, pace.top)) for length, limit in legs)
+    way = math.fsum(length for length, _ in legs)
+    free = math.fsum(length / max(0.1, min(limit, pace.top)) for length, limit in legs)
     if pace.start is None:
         return free
     if pace.start > STANDING:
@@ -156,7 +156,7 @@ def phase_at_start(
         lead_s: how long the letter has been shown by then, if that is before the middle [s].
     """
     shown = [state[link : link + 1] == letter for _, state in phases]
-    ends = [sum(duration for duration, _ in phases[: i + 1]) for i in range(len(phases))]
+    ends = [math.fsum(duration for duration, _ in phases[: i + 1]) for i in range(len(phases))]
     cycle = ends[-1] if ends else 0.0
     if not any(shown) or cycle <= 0.0:
         return None
@@ -170,13 +170,13 @@ def _longest(durations: Sequence[float], shown: Sequence[bool]) -> tuple[float, 
     """Beginning and length of the longest run of phases shown, round the end of the cycle [s]."""
     count = len(durations)
     if all(shown):
-        return 0.0, sum(durations)
+        return 0.0, math.fsum(durations)
     runs: list[tuple[float, float]] = []
     for first in range(count):
         if shown[first] and not shown[first - 1]:
             last = next(i for i in range(first, first + count) if not shown[i % count])
-            length = sum(durations[i % count] for i in range(first, last))
-            runs.append((sum(durations[:first]), length))
+            length = math.fsum(durations[i % count] for i in range(first, last))
+            runs.append((math.fsum(durations[:first]), length))
     return max(runs, key=lambda run: run[1])
 
 

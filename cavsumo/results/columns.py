@@ -37,8 +37,8 @@ COLUMNS: Mapping[str, str] = {
     "min_ttc_s": "smallest time to collision of the moving ego and a tester at constant "
     "velocities, before the first contact; empty above 10 s",
     "max_drac_mps2": "largest deceleration by which the ego just avoids that collision; 0 for none",
-    "pet_s": "post-encroachment time: how long after the one the other, ego or tester, came to a "
-    "place of its way; 0 with a contact, empty above 10 s",
+    "pet_s": "post-encroachment time: how long after the one, ego or tester, left an area that "
+    "both sweep the other came there; 0 if both were in it at once, empty above 10 s",
     "ego_speed_mps": "speed of the ego at the violation, else at the trigger",
     "impact_speed_mps": "closing speed along the ego's heading at contact",
     "max_decel_mps2": "hardest braking of the ego",

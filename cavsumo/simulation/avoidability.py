@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 from cavsumo.agents.base import Agent
 from cavsumo.agents.recorded import RecordedAgent
@@ -53,17 +53,25 @@ class Avoidability:
 
 
 class ContactWatch(Assertion):
-    """What a rerun is about: the moving ego touches nobody.
+    """What a rerun is about: from the takeover on the moving ego touches nobody.
 
     A body that touches the standing ego, or a vehicle that runs into the side or rear of a moving
-    one, is no failure of the driver.
+    one, is no failure of the driver. Nor is whom the original touched before.
+
+    Args:
+        since: the timestep of the takeover.
     """
 
     name = "takeover"
     sees_background = False
 
+    def __init__(self, since: int = -1) -> None:
+        self.since = since
+
     def observe(self, snapshot: Snapshot, contacts: Sequence[Contact]) -> None:
         ego = snapshot.ego
+        if snapshot.step <= self.since:
+            return
         for contact in contacts:
             if contact.a is not ego or ego.v <= STANDING_MPS:
                 continue
@@ -85,7 +93,6 @@ class AvoidabilityCheck:
         record: whether everybody was shown in its snapshots.
         episode: what happened; its frames and actions were kept.
         beat: called before each rerun, so that whoever waits knows that it goes on.
-        broken: the assertion that was violated.
     """
 
     setup: Setup
@@ -94,12 +101,15 @@ class AvoidabilityCheck:
     record: bool
     episode: Episode
     beat: Callable[[], None]
-    broken: Assertion = field(init=False)
 
-    def __post_init__(self) -> None:
-        said = self.episode.judgement
-        broken = next(a for a in self.setup.assertions if a.judgement is said)
-        object.__setattr__(self, "broken", broken)
+    @property
+    def broken(self) -> Assertion:
+        """The assertion that was violated.
+
+        Known by its name: what the stage's assertions judge is of the latest episode played there.
+        """
+        name = self.episode.judgement.assertion
+        return next(a for a in self.setup.assertions if a.name == name)
 
     @property
     def end(self) -> int:
@@ -191,7 +201,7 @@ class AvoidabilityCheck:
         the end of the episode.
         """
         self.beat()
-        episode, broken, watch = self.episode, self.broken, ContactWatch()
+        episode, broken, watch = self.episode, self.broken, ContactWatch(step)
         # Whoever is left out of the rerun saw what the first episode showed.
         record = self.record or any(a.sees_background for a in self.setup.assertions)
         ego = Takeover(self.setup.ego, reference, step, drives=episode.drives)

@@ -70,7 +70,7 @@ class RewardMonitor:
                     fair = judgement.triggered and judgement.tester not in cheats
                     if fair and judgement.tester in names:
                         rewards[a] += GOAL
-        self.total += sum(rewards)
+        self.total += math.fsum(rewards)
         return rewards, self._over
 
     def lost(self) -> Feedback | None:
@@ -79,7 +79,7 @@ class RewardMonitor:
             return None
         self._over = True
         rewards = [-self._dt * TIME_COST for _ in self._teams]
-        self.total += sum(rewards)
+        self.total += math.fsum(rewards)
         return rewards, True
 
     def _look_up(self, i: int, body: BodyState) -> None:

@@ -10,7 +10,7 @@ import math
 from collections.abc import Sequence
 from typing import NamedTuple
 
-from cavsumo.agents.driving import extent
+from cavsumo.agents.driving import BESIDE_M, extent
 from cavsumo.assertions.contacts import STANDING_MPS
 from cavsumo.model.scene import Scene
 from cavsumo.model.snapshot import BodyState, Snapshot
@@ -60,8 +60,12 @@ class Encounter(NamedTuple):
 
     @property
     def in_way(self) -> bool:
-        """Whether the body is in the strip and the ego comes nearer, if only for now."""
-        return self.beside < 0.0 and -self.length < self.gap <= SIGHT_M and self.speed > self.onward
+        """Whether the body is where the ego cannot pass, and the ego comes nearer, if only for now.
+
+        That is in the strip, or on the carriageway with less than ``BESIDE_M`` between them.
+        """
+        ahead = -self.length < self.gap <= SIGHT_M
+        return self.on_road and self.beside < BESIDE_M and ahead and self.speed > self.onward
 
 
 def _spell(distance: float, length: float, speed: float) -> tuple[float, float]:
@@ -99,15 +103,16 @@ def encounter(scene: Scene, snapshot: Snapshot, body: BodyState) -> Encounter:
 
 
 def lasting_conflict(encounters: Sequence[Encounter | None], dt: float) -> int | None:
-    """The timestep at which the conflict began that is under way at the end; None for none.
+    """The timestep at which the risk began that is under way at the end; None for none.
 
-    A conflict is one to a driver if it lasts for ``EVALUATION_S``, or until the end. It is over
-    once there has been none for as long and the body was not in the way: what was settled before
-    has nothing to do with the end.
+    A risk is a conflict, or a body in the way: whoever is there may stay there, so a driver does
+    not wait for a velocity that leads to a touch. It is one to a driver if it lasts for
+    ``EVALUATION_S``, or until the end. It is over once there has been none for as long: what was
+    settled before has nothing to do with the end.
     """
     alarm = began = ceased = None
     for step, met in enumerate(encounters):
-        if met is not None and (met.conflict or (alarm is not None and met.in_way)):
+        if met is not None and (met.conflict or met.in_way):
             began, ceased = step if began is None else began, None
             if alarm is None and _lasts(began, step, dt):
                 alarm = began

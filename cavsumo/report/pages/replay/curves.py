@@ -2,7 +2,9 @@
 
 * gap: the smallest distance between the ego's box and a tester's [m], 0 where they touch;
 * time to collision: gap / closing speed, the closing speed being that of the two centres along the
-  line between them; the smallest over the testers that come nearer, nothing where none does.
+  line between them; the smallest over the testers that come nearer, nothing where none does. Of
+  those who are on the carriageway or entering it, or touch the ego: who stays on the pavement is
+  passed.
 """
 
 from __future__ import annotations
@@ -11,10 +13,14 @@ import math
 from collections.abc import Mapping
 from typing import Any, NamedTuple
 
+from shapely.geometry import LineString
+
+from cavsumo.model.carriageway import Roads
 from cavsumo.model.geometry import Box, gap
 from cavsumo.results.traces import Shape
 
 CLOSING_MPS = 0.01  # slower than this nobody comes nearer
+ENTERING_S = 1.0  # whose front is on the carriageway so soon, walking straight on, is entering it
 
 
 class CurvePoint(NamedTuple):
@@ -25,14 +31,17 @@ class CurvePoint(NamedTuple):
     ttc: float | None  # s
 
 
-def moment(frame: Mapping[str, Any], shapes: Mapping[str, Shape]) -> CurvePoint:
-    """The curves at a frame of a trace."""
+def moment(
+    frame: Mapping[str, Any], shapes: Mapping[str, Shape], roads: Roads | None = None
+) -> CurvePoint:
+    """The curves at a frame of a trace; without roads all of the plane is a carriageway."""
     ego = frame["ego"]
     own = _box(ego, shapes["ego"])
     near: list[tuple[float, float | None]] = []
     for name, state in frame["testers"].items():
         distance = gap(own, _box(state, shapes[name]))
-        near.append((distance, time_to_collision(distance, ego, state)))
+        counts = distance == 0.0 or roads is None or on_or_entering(roads, state, shapes[name])
+        near.append((distance, time_to_collision(distance, ego, state) if counts else None))
     times = [t for _, t in near if t is not None]
     return CurvePoint(ego[2], min((d for d, _ in near), default=None), min(times, default=None))
 
@@ -50,6 +59,21 @@ def time_to_collision(distance: float, ego: list[float], other: list[float]) -> 
     vy = other[2] * math.sin(other[3]) - ego[2] * math.sin(ego[3])
     closing = -(dx * vx + dy * vy) / apart
     return distance / closing if closing > CLOSING_MPS else None
+
+
+def on_or_entering(roads: Roads, state: list[float], shape: Shape) -> bool:
+    """Whether a body's centre is on the carriageway, or its front will be within ``ENTERING_S``.
+
+    The state is [x, y, v, o]. One that stands enters nothing.
+    """
+    x, y, v, o = state
+    if roads.contains(x, y):
+        return True
+    if v <= 0.0:
+        return False
+    ahead = shape.length / 2 + v * ENTERING_S
+    way = LineString([(x, y), (x + ahead * math.cos(o), y + ahead * math.sin(o))])
+    return bool(roads.carriageway.intersects(way))
 
 
 def _box(state: list[float], shape: Shape) -> Box:

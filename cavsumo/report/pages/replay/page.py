@@ -47,7 +47,7 @@ def page(record: Record, trace: Trace, site: Site) -> str:
 def episode(record: Record, trace: Trace, site: Site) -> dict[str, Any]:
     """The data of an episode, packed for the player."""
     met, frames = trace.shapes(), trace.frames
-    curves = [moment(frame, met) for frame in frames]
+    curves = [moment(frame, met, site.roads) for frame in frames]
     zones = list(_zones(record, frames, met["ego"]))
     return {
         "dt": record.plan.scenario.step_length,
