@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import html
 import importlib.util
 import json
 import os
+import re
 import subprocess
 import sys
 from collections.abc import Callable
@@ -232,6 +234,98 @@ def test_a_picture_is_drawn_without_a_screen(
     road = tmp_path / "road.svg"
     assert main(["inspect", str(networks["pedestrians"]), "--picture", str(road)]) == 0
     assert road.stat().st_size > 1000
+
+
+def _renamed(networks: dict[str, Path], folder: Path, name: str) -> Path:
+    """The crossing with another name of its street from north to south."""
+    net = folder / "renamed.net.xml"
+    text = networks["crossing"].read_text(encoding="utf-8").replace("Fabianinkatu", name)
+    net.write_text(text, encoding="utf-8")
+    return net
+
+
+def _written(svg: Path) -> list[str]:
+    """The texts of a picture; matplotlib says each in a comment before it draws its letters."""
+    found = re.findall(r"<!-- (.*?) -->", svg.read_text(encoding="utf-8"), re.DOTALL)
+    return [html.unescape(text) for text in found]
+
+
+def test_a_picture_has_a_title_and_the_names_of_streets(
+    networks: dict[str, Path], tmp_path: Path, capsys: Capture, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The streets that meet, then the junction; each street's name where it runs."""
+    layers = pytest.importorskip("cavsumo.network.drawing.layers")
+    drawn: list[str] = []
+    text = layers.Axes.text
+    monkeypatch.setattr(
+        layers.Axes, "text", lambda self, *a, **k: (drawn.append(a[2]), text(self, *a, **k))[1]
+    )
+    file = tmp_path / "a.svg"
+    assert main(["inspect", str(networks["crossing"]), "--picture", str(file)]) == 0
+    texts = _written(file)
+    assert "Fabianinkatu / Yliopistonkatu" in texts
+    assert "junction 4435014132, crossing.net.xml" in texts
+    assert {"Fabianinkatu", "Yliopistonkatu"} <= set(drawn)
+    assert capsys.readouterr().err == ""
+
+
+def test_letters_that_the_usual_font_lacks_are_written_in_another(
+    networks: dict[str, Path], tmp_path: Path, capsys: Capture
+) -> None:
+    """Any font of the machine that has them."""
+    layers = pytest.importorskip("cavsumo.network.drawing.layers")
+    manager = layers.font_manager
+    usual = layers._letters(manager.findfont(manager.FontProperties()))
+    others = sorted({e.fname for e in manager.fontManager.ttflist if layers.BOXES not in e.name})
+    rare = next(
+        chr(code)
+        for file in others
+        for code in sorted(layers._letters(file) - usual)
+        if chr(code).isalpha() and code < 0xE000
+    )
+    file = tmp_path / "a.svg"
+    net = _renamed(networks, tmp_path, f"{rare}{rare}")
+    assert main(["inspect", str(net), "--picture", str(file)]) == 0
+    assert any(f"{rare}{rare}" in text for text in _written(file))
+    assert capsys.readouterr().err == ""
+
+
+def test_a_name_that_no_font_can_write_is_left_out_and_said(
+    networks: dict[str, Path], tmp_path: Path, capsys: Capture, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The title then has the others; without any it is the junction."""
+    layers = pytest.importorskip("cavsumo.network.drawing.layers")
+    monkeypatch.setattr(layers, "_letters", lambda file: frozenset(range(0x250)))
+    layers.font_for.cache_clear()
+    file = tmp_path / "a.svg"
+    net = _renamed(networks, tmp_path, "\u82b1\u56ed\u8857")
+    try:
+        assert main(["inspect", str(net), "--picture", str(file)]) == 0
+        err = capsys.readouterr().err
+        assert "no font on this machine can write \u82b1\u56ed\u8857" in err
+        assert "Yliopistonkatu" in _written(file)
+        text = net.read_text(encoding="utf-8")
+        net.write_text(text.replace("Yliopistonkatu", "\u5317\u8def"), encoding="utf-8")
+        assert main(["inspect", str(net), "--picture", str(file)]) == 0
+        assert "junction 4435014132" in _written(file)
+    finally:
+        layers.font_for.cache_clear()
+
+
+def test_a_picture_that_takes_long_says_what_it_does(
+    networks: dict[str, Path], tmp_path: Path, capsys: Capture, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """On stderr, each step once; nothing before its time has come."""
+    pytest.importorskip("matplotlib")
+    words = ["inspect", str(networks["crossing"]), "--picture", str(tmp_path / "a.svg")]
+    monkeypatch.setattr("cavsumo.cli.steps.AFTER_S", 3600.0)
+    assert main(words) == 0
+    assert capsys.readouterr().err == ""
+    monkeypatch.setattr("cavsumo.cli.steps.AFTER_S", 0.0)
+    assert main(words) == 0
+    lines = capsys.readouterr().err.splitlines()
+    assert [line.split()[1] for line in lines] == ["reading", "looking", "drawing"]
+    assert all(line.startswith("cavsumo: ") and line.endswith(" ...") for line in lines)
 
 
 @pytest.mark.parametrize(

@@ -10,11 +10,12 @@ from typing import Any
 
 from cavsumo.batch.dispatch import run_batch
 from cavsumo.batch.learning import Lessons
-from cavsumo.batch.prepared import PreparedBatch
+from cavsumo.batch.prepared import OUTPUTS, PreparedBatch
 from cavsumo.batch.progress import Progress
 from cavsumo.batch.stopping import stopping_rule
 from cavsumo.batch.tally import Tally
 from cavsumo.batch.worker import Answer
+from cavsumo.egos.ego_files import OutputWatch
 from cavsumo.errors import BatchError
 from cavsumo.model.scenario import BatchPlan
 from cavsumo.results.reading import COMPLETE, rows_of
@@ -48,6 +49,9 @@ class BatchRun:
     status: str = "broken"
     cut_short: bool = False
 
+    def __post_init__(self) -> None:
+        self._watch = OutputWatch(self.prepared.plan.scenario.ego, self.prepared.checksums)
+
     def begin(self, manifest: Mapping[str, Any], *, overwrite: bool = False) -> None:
         """Start the results file."""
         self._todo = self.prepared.plan.todo()
@@ -74,7 +78,8 @@ class BatchRun:
             for outcome, memory in self._answers(self._todo) if reason is None else ():
                 row = self.recorder.write(outcome)
                 self.tally.add(row)
-                if self._lessons.learned(row, memory) and self._lessons.due:
+                learned = self._lessons.learned(row, memory) and self._lessons.due
+                if self._note_outputs() or learned:
                     self.recorder.checkpoint(self._lessons.facts())
                 progress.update(self.tally)
                 reason = rule(self.tally)
@@ -109,8 +114,20 @@ class BatchRun:
 
     def end(self) -> None:
         """Complete the manifest."""
+        self._note_outputs()
         facts = {"episodes": self.tally.rows, "counts": self.tally.all.outcomes}
         self.recorder.finish(self.status, facts | self._lessons.facts())
+
+    def _note_outputs(self) -> bool:
+        """Note in the manifest which files the ego has written; whether there are new ones."""
+        noted = self.recorder.manifest
+        before = set(noted.get(OUTPUTS) or ())
+        found = before.union(self._watch.outputs())
+        if found == before:
+            return False
+        noted[OUTPUTS] = sorted(found)
+        noted["sha256"] = {k: v for k, v in noted["sha256"].items() if k not in found}
+        return True
 
     def _answers(self, todo: Iterable[int]) -> Iterator[Answer]:
         """Have episodes played."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from functools import cached_property
 from typing import Any
 
@@ -24,10 +24,15 @@ from cavsumo.simulation.setup import make_setup
 
 
 class EpisodeRunner:
-    """A plan set up in this process: plays jobs one after another; a context manager."""
+    """A plan set up in this process: plays jobs one after another; a context manager.
 
-    def __init__(self, plan: BatchPlan, site: Site) -> None:
-        self.plan = plan
+    ``inputs``: the checksums of its files if they are known already.
+    """
+
+    def __init__(
+        self, plan: BatchPlan, site: Site, inputs: Mapping[str, str] | None = None
+    ) -> None:
+        self.plan, self._inputs = plan, inputs
         self.setup = make_setup(plan.scenario, site)
         self._agents: dict[str, tuple[list[Agent], tuple[Any, ...] | None]] = {}
 
@@ -40,7 +45,7 @@ class EpisodeRunner:
     @cached_property
     def _origin(self) -> dict[str, Any]:
         """What the traces of all episodes have in common."""
-        return origin(self.plan, self.setup.site)
+        return origin(self.plan, self.setup.site, self._inputs)
 
     def try_out(self, *, strict: bool = True) -> None:
         """Start the ego and SUMO once: what they refuse comes out before anything is written.

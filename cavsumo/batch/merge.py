@@ -7,6 +7,7 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
+from cavsumo.batch.prepared import OUTPUTS
 from cavsumo.batch.replay import recorded_plan
 from cavsumo.batch.summary import Ended
 from cavsumo.batch.tally import Tally
@@ -52,7 +53,7 @@ def _whole_manifest(parts: Sequence[Path]) -> dict[str, Any]:
                 + "; ".join(different)
             )
     assert first is not None
-    kept = {"command", "ego_route", "junction", "sha256", "versions", "sumo_options"}
+    kept = {"command", "ego_route", "junction", "sha256", "versions", "sumo_options"} | {OUTPUTS}
     plan = dict(first["plan"]) | {"shard": None}
     return {key: first[key] for key in first if key in kept} | {
         "plan": plan,

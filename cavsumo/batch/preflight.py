@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from cavsumo.batch.prepared import PreparedBatch, manifest, prepare
+from cavsumo.batch.prepared import OUTPUTS, PreparedBatch, manifest, prepare
 from cavsumo.errors import InputError, ResultsError
 from cavsumo.model.scenario import plan_from
 from cavsumo.model.study import Part
@@ -52,6 +53,13 @@ class CheckedBatch:
     manifest: Mapping[str, Any]
     recorded: Mapping[str, Any] | None
 
+    def without(self, outputs: Sequence[str]) -> CheckedBatch:
+        """The same batch, but some files are what its ego writes."""
+        prepared = self.prepared.without(outputs)
+        return dataclasses.replace(
+            self, prepared=prepared, manifest={**self.manifest, **manifest(prepared)}
+        )
+
 
 def checked(parts: Sequence[Part], output: Path, manner: Manner) -> list[CheckedBatch]:
     """Check all parts of a run before any is played; raises InputError in one sentence."""
@@ -69,6 +77,7 @@ def _checked(part: Part, output: Path, manner: Manner) -> CheckedBatch:
     recorded = _recorded(output, manner)
     source = f"run: {part.name}" if part.name else "run"
     prepared = prepare(plan_from({**recorded_settings(recorded), **part.settings}, source))
+    prepared = prepared.without(recorded_outputs(recorded))
     now = manifest(prepared)
     different = [] if recorded is None else list(differences(recorded, now))
     if different:
@@ -97,6 +106,11 @@ def _recorded(output: Path, manner: Manner) -> dict[str, Any] | None:
     if manner.resume and not rows and not output.with_suffix(".json").exists():
         return None  # a kill may leave an empty file
     return read_manifest(output)
+
+
+def recorded_outputs(recorded: Mapping[str, Any] | None) -> list[str]:
+    """The files that the ego of a recorded batch wrote."""
+    return [str(name) for name in (recorded or {}).get(OUTPUTS) or ()]
 
 
 def recorded_settings(recorded: Mapping[str, Any] | None) -> dict[str, Any]:

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import dataclasses
 import hashlib
 import math
 import sys
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -17,6 +18,7 @@ from cavsumo.agents.manoeuvres import types_for
 from cavsumo.assertions import make_assertions
 from cavsumo.egos import make_ego
 from cavsumo.egos.base import Ego
+from cavsumo.egos.ego_files import data_files, machine
 from cavsumo.errors import InputError
 from cavsumo.model.bodies import WALKING, Kind, kind_named
 from cavsumo.model.scenario import BatchPlan
@@ -26,6 +28,8 @@ from cavsumo.network.traffic_lights import Pace
 from cavsumo.results.provenance import checksums, traffic_checksum, unequal, versions
 from cavsumo.sumo.demand import BEYOND_S
 from cavsumo.sumo.options import OPTIONS
+
+OUTPUTS = "ego_outputs"  # in a manifest: the files of its command that the ego wrote
 
 
 @dataclass(frozen=True)
@@ -37,6 +41,7 @@ class PreparedBatch:
         folder: the working folder that the plan's files are relative to.
         checksums: of the plan's files, so that a process elsewhere notices other ones.
         versions: of what the results depend on.
+        machine: that on which it was prepared; files that an ego writes differ on others.
         key: stands for all of it.
     """
 
@@ -45,6 +50,7 @@ class PreparedBatch:
     folder: str
     checksums: Mapping[str, str]
     versions: Mapping[str, str]
+    machine: str = field(default_factory=machine)
     key: str = field(init=False)
 
     def __post_init__(self) -> None:
@@ -52,10 +58,27 @@ class PreparedBatch:
         object.__setattr__(self, "key", hashlib.sha256(repr(facts).encode()).hexdigest())
 
     def check_here(self) -> None:
-        """Raise InputError unless this process sees the same files and versions."""
-        pairs = {**self.versions, **self.checksums}, {**versions(), **checksums(self.plan)}
-        for name, (there, here) in unequal(*pairs):
+        """Raise InputError unless this process sees the same inputs and versions.
+
+        What the ego may have written since is no input (``ego_files``).
+        """
+        found = {**versions(), **checksums(self.plan)}
+        free = self._written_here()
+        for name, (there, here) in unequal({**self.versions, **self.checksums}, found):
+            if name in free or (there is None and name not in self.versions):
+                continue
             raise InputError(f"{name} is {here} in the process that simulates, expected {there}")
+
+    def _written_here(self) -> set[str]:
+        """The files of the ego that may have changed on this machine."""
+        if machine() != self.machine:
+            return set()
+        return {str(file) for file in data_files(self.plan.scenario.ego)}
+
+    def without(self, outputs: Collection[str]) -> PreparedBatch:
+        """The same setting, but some files are no inputs."""
+        kept = {name: sum for name, sum in self.checksums.items() if name not in outputs}
+        return dataclasses.replace(self, checksums=kept)
 
 
 def prepare(plan: BatchPlan, ego: Ego | None = None) -> PreparedBatch:

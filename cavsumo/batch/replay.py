@@ -13,9 +13,9 @@ from cavsumo.agents.casting import learners
 from cavsumo.batch.jobs import Job, job
 from cavsumo.batch.worker import Worker, search
 from cavsumo.errors import DivergenceError, InputError, ResultsError
+from cavsumo.model.checksums import checksum
 from cavsumo.model.scenario import BatchPlan, Scenario
 from cavsumo.results.columns import COLUMNS
-from cavsumo.results.provenance import checksum
 from cavsumo.results.reading import STARTING, read_manifest, read_rows
 from cavsumo.results.rows import Outcome, Row, cell
 from cavsumo.results.traces import NOT_REPLAYED, Trace, read_trace

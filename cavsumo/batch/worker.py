@@ -17,7 +17,7 @@ import sys
 import tempfile
 import threading
 import time
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from multiprocessing import Pipe
 from multiprocessing.connection import Connection
 from typing import Any
@@ -26,7 +26,9 @@ from cavsumo.batch.jobs import Job, failed
 from cavsumo.batch.prepared import PreparedBatch
 from cavsumo.batch.worker_process import GOES_ON, GOODBYE
 from cavsumo.errors import BatchError, InputError
-from cavsumo.model.processes import ending, inner_environment
+from cavsumo.model.offspring import kill_descendants
+from cavsumo.model.own_folders import OwnFolder, sweep_once
+from cavsumo.model.processes import by_a_lasting_thread, ending, inner_environment
 from cavsumo.model.scenario import Simulation
 from cavsumo.results.rows import Outcome, is_test
 
@@ -136,24 +138,17 @@ class Worker:
         if self.closed:
             raise BatchError("the batch is over")
         self._played = 0
-        self._folder = tempfile.TemporaryDirectory(prefix="cavsumo-worker-")
+        sweep_once()
+        self._folder = OwnFolder("worker")
         self._log = tempfile.TemporaryFile()  # noqa: SIM115  # lives as long as the process
         self._pipe, theirs = Pipe()
         _limit(self._pipe)
         fds = theirs.fileno(), self._log.fileno()
-        numbers = (*fds, os.getpid())
         # what a killed process leaves goes with this folder
         environment = inner_environment() | {"TMPDIR": self._folder.name}
         _WORKERS.add(self)
         try:
-            self._process = subprocess.Popen(
-                [sys.executable, "-P", "-m", "cavsumo.batch.worker_process", *map(str, numbers)],
-                pass_fds=fds,
-                cwd=self.prepared.folder,
-                env=environment,
-                stdin=subprocess.DEVNULL,
-                process_group=0,  # Ctrl-C is for the parent; and all of it can be killed
-            )
+            self._process = by_a_lasting_thread(lambda: self._started(fds, environment))
         except OSError as error:
             raise InputError(
                 f"cannot start a process in {self.prepared.folder!r}: {error}"
@@ -164,6 +159,25 @@ class Worker:
             _kill(self._process)
         with contextlib.suppress(OSError):  # it died already, as _receive will find
             self._pipe.send((self.prepared, strict))
+
+    def _started(
+        self, fds: tuple[int, int], environment: Mapping[str, str]
+    ) -> subprocess.Popen[bytes]:
+        """The process, just started."""
+        return subprocess.Popen(
+            [
+                sys.executable,
+                "-P",
+                "-m",
+                "cavsumo.batch.worker_process",
+                *map(str, (*fds, os.getpid())),
+            ],
+            pass_fds=fds,
+            cwd=self.prepared.folder,
+            env=environment,
+            stdin=subprocess.DEVNULL,
+            process_group=0,  # Ctrl-C is for the parent; and all of it can be killed
+        )
 
     def _receive(self, deadline: float) -> Any:
         """What the process sends, or _ProcessGone when it died or took too long."""
@@ -207,7 +221,7 @@ class Worker:
         self._process = None
         self._pipe.close()
         self._log.close()
-        self._folder.cleanup()
+        self._folder.close()
 
 
 class _ProcessGone(Exception):
@@ -222,7 +236,13 @@ def _limit(pipe: Connection) -> None:
 
 
 def _kill(process: subprocess.Popen[bytes]) -> None:
-    """Kill a process and its children, stopped ones too, and wait for its end."""
+    """Kill a process and its descendants, stopped ones too, and wait for its end.
+
+    Its descendants first: once it is gone they are those of somebody else.
+    """
+    if process.poll() is None:
+        process.send_signal(signal.SIGSTOP)  # so that it starts no others
+        kill_descendants(process.pid)
     with contextlib.suppress(ProcessLookupError):
         os.killpg(process.pid, signal.SIGKILL)
     process.wait(10.0)

@@ -16,6 +16,7 @@ from multiprocessing.connection import Connection
 from cavsumo.batch.jobs import Job
 from cavsumo.batch.prepared import PreparedBatch
 from cavsumo.errors import CavsumoError
+from cavsumo.model.offspring import adopt_orphans, kill_descendants
 from cavsumo.model.processes import leash
 
 IDLE_S = 60.0  # a process with nothing to do for so long goes
@@ -27,6 +28,7 @@ ALARM_AFTER_S = 30.0  # how long after an episode's deadline the process ends it
 def main(pipe_fd: int, log_fd: int, parent: int) -> None:
     """Set up what the first message describes, say so, then play."""
     leash(parent)()
+    adopt_orphans()
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # the parent decides what Ctrl-C means
     signal.signal(signal.SIGALRM, signal.SIG_DFL)
     divert_output(log_fd)
@@ -34,6 +36,7 @@ def main(pipe_fd: int, log_fd: int, parent: int) -> None:
     with contextlib.suppress(EOFError, ConnectionError):  # the parent is gone or has no more jobs
         _serve(pipe, *pipe.recv())
     sys.stderr.flush()
+    kill_descendants(os.getpid())  # daemons of the ego that hide where they come from
     os._exit(0)  # taking Python and its libraries apart takes longer than an episode
 
 
@@ -44,7 +47,9 @@ def _serve(pipe: Connection, prepared: PreparedBatch, strict: bool) -> None:
     with contextlib.ExitStack() as stack:
         try:
             prepared.check_here()
-            runner = stack.enter_context(EpisodeRunner(prepared.plan, prepared.site))
+            runner = stack.enter_context(
+                EpisodeRunner(prepared.plan, prepared.site, prepared.checksums)
+            )
             runner.try_out(strict=strict)
         except (CavsumoError, OSError) as error:
             pipe.send(str(error))

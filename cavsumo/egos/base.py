@@ -88,6 +88,9 @@ class Ego:
         """The command for the next timestep; None lets SUMO drive, in every timestep."""
         return None
 
+    def conclude(self) -> None:
+        """The episode is over: EgoError if its answers turn out to be those to other questions."""
+
     def take_log(self) -> str:
         """What it has printed since the last call, to be kept beside the episode's row."""
         return ""

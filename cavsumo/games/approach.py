@@ -36,7 +36,7 @@ NEAR = 100.0  # times the residual wanted, within which there are only jumps
 Tell = Callable[[str, float], None]  # called with what is being done and the residual
 
 
-class Approach(NamedTuple):
+class Approximation(NamedTuple):
     """The best that was met.
 
     Attributes:
@@ -60,7 +60,7 @@ def approach(
     *,
     near: Any = None,
     steps: Floats | None = None,
-) -> Approach:
+) -> Approximation:
     """V with |T V + shift - V| <= residual if it can be had.
 
     ``near`` is the pair that V is nearly the value of, if one is known: then there are no sweeps,
@@ -92,10 +92,10 @@ def _by_jumps(
     tell: Tell,
     near: Any,
     steps: Floats | None,
-) -> Approach:
+) -> Approximation:
     """Jumps until the residual is small, or is not halved any more."""
     sweeps, before, stuck = play.sweeps if near is None else 0, near, 0
-    best = Approach(value, None, np.inf)
+    best = Approximation(value, None, np.inf)
     for _ in range(JUMPS):
         advantage, pair = play.backup(value)
         advantage += shift
@@ -103,7 +103,7 @@ def _by_jumps(
         tell(doing, left)
         stuck = 0 if left < 0.5 * best.left else stuck + 1
         if left < best.left or best.pair is None:
-            best = Approach(value.copy(), pair, left)
+            best = Approximation(value.copy(), pair, left)
         if left <= residual or stuck > PATIENCE:
             break
         proper = made_proper(play, pair, value)
@@ -124,12 +124,12 @@ def _same(pair: Any, before: Any) -> bool:
 
 def _by_policies(
     play: Play, held: Any, value: Floats, shift: Floats, residual: float, doing: str, tell: Tell
-) -> tuple[Approach, Any]:
+) -> tuple[Approximation, Any]:
     """Some steps of strategy iteration: the best that was met, and the policy to go on with.
 
     That is None where no policy is better, or a value was not found.
     """
-    best = Approach(value, None, np.inf)
+    best = Approximation(value, None, np.inf)
     for _ in range(POLICIES):
         found = _worst(play, held, value, shift, residual)
         if found is None:  # so long on the way to a goal that floats cannot tell
@@ -141,7 +141,7 @@ def _by_policies(
         left = float(np.abs(advantage + shift).max())
         tell(doing, left)
         if left < best.left:
-            best = Approach(value.copy(), pair, left)
+            best = Approximation(value.copy(), pair, left)
         better = play.improved(held, value, 0.25 * residual)
         if left <= residual or np.array_equal(better, held):
             return best, None

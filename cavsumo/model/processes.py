@@ -6,7 +6,10 @@ import os
 import signal
 import sys
 from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+from typing import TypeVar
 
+Started = TypeVar("Started")
 PR_SET_PDEATHSIG = 1  # Linux, prctl(2)
 OUTER_PATH = "CAVSUMO_OUTER_PYTHONPATH"  # what PYTHONPATH was before it was set for our own
 
@@ -29,6 +32,19 @@ def leash(parent: int) -> Callable[[], None]:
             os._exit(1)
 
     return put_on
+
+
+_LASTING: dict[int, ThreadPoolExecutor] = {}  # by process, because a fork has no threads
+
+
+def by_a_lasting_thread(start: Callable[[], Started]) -> Started:
+    """Have something started by a thread that ends with this process.
+
+    What Linux calls the death of a parent is that of the thread which started the child (prctl(2),
+    PR_SET_PDEATHSIG), and the threads of an executor end before what they started is closed.
+    """
+    executor = _LASTING.setdefault(os.getpid(), ThreadPoolExecutor(1, "cavsumo-start"))
+    return executor.submit(start).result()
 
 
 def ending(code: int) -> str:

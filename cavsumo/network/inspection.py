@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import Any
 
 import shapely
@@ -14,6 +15,7 @@ from cavsumo.errors import NetworkError
 from cavsumo.model.carriageway import Roads
 from cavsumo.network.ego_routes import EgoRoute, Movement, movements, ranked_routes, route_through
 from cavsumo.network.facts import place
+from cavsumo.network.intersections import Pieces, intersections
 from cavsumo.network.pedestrian_starts import StartingArea, WaysAcross, starting_areas
 from cavsumo.network.reader import Network, is_normal, lane_shape, street
 
@@ -55,8 +57,9 @@ class Junction:
         id, type: SUMO's.
         x, y: where it is [m].
         centre: its latitude and longitude [degrees], None when not known.
-        streets: names of the roads that meet there.
-        crossings: how many pedestrian crossings it has.
+        pieces: ids of all junctions of the intersection that it is a piece of, itself among them.
+        streets: names of the roads that meet there, at any of the pieces.
+        crossings: how many pedestrian crossings the pieces have.
         ways: through it, the best first, U-turns last.
     """
 
@@ -65,6 +68,7 @@ class Junction:
     x: float
     y: float
     centre: tuple[float, float] | None
+    pieces: tuple[str, ...]
     streets: tuple[str, ...]
     crossings: int
     ways: tuple[Way, ...]
@@ -90,6 +94,11 @@ class InspectedNetwork:
     lines: shapely.STRtree
     ways: WaysAcross = field(default_factory=dict)
 
+    @cached_property
+    def pieces(self) -> Pieces:
+        """For every junction the pieces of its intersection."""
+        return intersections(self.network)
+
 
 def ground(network: Network, half_m: float) -> InspectedNetwork:
     """Prepare a network for a look at its junctions; ValueError for lanes without a shape."""
@@ -103,27 +112,31 @@ def ground(network: Network, half_m: float) -> InspectedNetwork:
 def best_junctions(here: InspectedNetwork, top: int) -> list[Junction]:
     """The junctions best worth testing, those where testers can meet the ego before the others.
 
-    The first is the one that ``cavsumo run`` chooses.
+    The first is the one that ``cavsumo run`` chooses. Of the pieces of one intersection only the
+    best is there.
     """
+    pieces = here.pieces
     reached: dict[str, Any] = {}
     others: dict[str, Any] = {}
     tried = 0
     for movement, route in ranked_routes(here.network, None, here.half_m):
-        key = str(movement.node.getID())
+        key = pieces[str(movement.node.getID())][0]
         if len(reached) >= top or (tried >= ATTEMPTS and len(reached) + len(others) >= top):
             break
         if key not in reached:
             tried += 1
             meets = tried <= ATTEMPTS and _areas(here, route)
             (reached if meets else others).setdefault(key, movement.node)
-    nodes = list({**reached, **others}.values())[:top]
-    return [junction(here, node) for node in nodes]
+    found = [*reached.values(), *(node for key, node in others.items() if key not in reached)]
+    return [junction(here, node) for node in found[:top]]
 
 
 def junction(here: InspectedNetwork, node: Any) -> Junction:
     """A junction with all ways through it; those where testers meet the ego come first."""
     network = here.network
     x, y = (float(value) for value in node.getCoord()[:2])
+    pieces = here.pieces[str(node.getID())]
+    nodes = [network.junction(piece) for piece in pieces]
     ranked = list(ranked_routes(network, str(node.getID()), here.half_m))
     for movement in movements(node):
         route = route_through(network, movement, here.half_m) if movement.turns_back else None
@@ -135,8 +148,9 @@ def junction(here: InspectedNetwork, node: Any) -> Junction:
         x=x,
         y=y,
         centre=place(network, x, y),
-        streets=_streets([*node.getIncoming(), *node.getOutgoing()]),
-        crossings=sum(crossing.getFromNode() is node for crossing in network.crossings()),
+        pieces=pieces,
+        streets=_streets(edge for n in nodes for edge in (*n.getIncoming(), *n.getOutgoing())),
+        crossings=sum(crossing.getFromNode() in nodes for crossing in network.crossings()),
         ways=tuple(sorted(ways, key=lambda way: not way.areas)),
     )
 

@@ -6,14 +6,13 @@ import hashlib
 import importlib.metadata
 import platform
 from collections.abc import Iterator, Mapping
-from pathlib import Path
 from typing import Any
 
 from cavsumo import __version__
 from cavsumo.agents.casting import agent_files
 from cavsumo.assertions.specs import assertion_files
 from cavsumo.egos.specs import ego_files
-from cavsumo.errors import InputError
+from cavsumo.model.checksums import checksum
 from cavsumo.model.scenario import BatchPlan
 from cavsumo.network.site import Site
 
@@ -30,15 +29,6 @@ def checksums(plan: BatchPlan) -> dict[str, str]:
     files += [*agent_files(plan), *ego_files(scenario.ego)]
     files += assertion_files(scenario.assertions)
     return {str(file): checksum(file) for file in files}
-
-
-def checksum(file: Path) -> str:
-    """The SHA-256 of a file, which may be large."""
-    try:
-        with file.open("rb") as stream:
-            return hashlib.file_digest(stream, "sha256").hexdigest()
-    except OSError as error:
-        raise InputError(f"{str(file)!r}: cannot be read: {error.strerror}") from error
 
 
 def versions() -> dict[str, str]:
@@ -72,6 +62,8 @@ def changes(recorded: Mapping[str, Any], now: Mapping[str, Any]) -> Iterator[str
     """What changed around a plan that stayed the same: versions, files, SUMO's options."""
     for part in ("versions", "sha256", "sumo_options"):
         for name, (was, is_) in unequal(recorded.get(part) or {}, now[part]):
+            if part == "sha256" and was is None:
+                continue  # the ego wrote it since; it was no input
             yield f"{part}: {name} was {was}, is {is_}"
 
 

@@ -69,11 +69,15 @@ class Trace:
         }
 
 
-def origin(plan: BatchPlan, site: Site) -> dict[str, Any]:
-    """What the episodes of a plan have in common, for the heads of their traces."""
+def origin(plan: BatchPlan, site: Site, inputs: Mapping[str, str] | None = None) -> dict[str, Any]:
+    """What the episodes of a plan have in common, for the heads of their traces.
+
+    ``inputs``: the checksums of its files if they are known; what they are now if not.
+    """
+    known = checksums(plan) if inputs is None else dict(inputs)
     return {
         "plan": plan.model_dump(mode="json", exclude=set(MANNER)),
-        "sha256": checksums(plan) | traffic_checksum(site),
+        "sha256": known | traffic_checksum(site),
         "versions": versions(),
         "sumo_options": dict(OPTIONS),
     }

@@ -192,9 +192,10 @@ class EpisodeLoop:
             episode.frames.append(snapshot)
 
     def _end(self, over: bool) -> None:
-        """Note whether the episode is over; if so, the assertions are told."""
+        """Note whether the episode is over; if so, the ego and the assertions are told."""
         self.over = over
         if over:
+            self._setup.ego.conclude()
             for assertion in self._setup.assertions:
                 assertion.conclude()
 

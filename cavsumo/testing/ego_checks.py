@@ -72,7 +72,7 @@ def check_start(make: MakeEgo, ground: ScriptNetwork) -> str:
 
 
 def check_empty_road(make: MakeEgo, ground: ScriptNetwork) -> str:
-    """It drives along an empty road, every answer one that its effectors can execute."""
+    """It drives along a road without anybody, lights green; every answer can be executed."""
     speeds: list[float] = []
     with prepared(make, ground) as ego:
         for snapshot, command in drive(ego, ground, EMPTY, 1):

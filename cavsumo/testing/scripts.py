@@ -24,6 +24,7 @@ DT = 0.1  # s
 SPEED = 8.0  # of an ego that does not say how fast it begins [m/s]
 CROWD = (PEDESTRIAN, CAR, BICYCLE, PEDESTRIAN, BUS, PEDESTRIAN)
 LETTERS = "rrruGGGGgy"  # shown for 3 s each
+TESTERS = 3
 
 
 @dataclass(frozen=True)
@@ -38,7 +39,7 @@ class ScriptNetwork:
         site, route = self.site, self.site.route
         return Mission(site.net, route.edges, route.path, site.lights, self.dt, steps * self.dt)
 
-    def scene(self, ego: Kind, seed: int, testers: int = 3) -> Scene:
+    def scene(self, ego: Kind, seed: int, testers: int = TESTERS) -> Scene:
         """A scene with tester pedestrians on the pavements beside the ego's way."""
         site, kinds = self.site, [PEDESTRIAN] * testers
         starts = site.draw(kinds, ego, None, np.random.default_rng(seed))
@@ -59,11 +60,15 @@ class Script:
         steps: how many timesteps.
         others: the background bodies at each of them.
         held: the ego is kept standing, whatever it commands, as in a jam.
+        testers: how many tester pedestrians stand on the pavements.
+        letters: what the traffic lights show in turn.
     """
 
     steps: int
     others: Others
     held: bool = False
+    testers: int = TESTERS
+    letters: str = LETTERS
 
 
 def ground(net: Path, ego: Kind, dt: float = DT) -> ScriptNetwork:
@@ -105,7 +110,8 @@ def oddities(scene: Scene, step: int) -> tuple[RawState, ...]:
     )
 
 
-EMPTY, CROWDED = Script(200, nobody), Script(200, crowd)
+# Nobody to brake for and no red light to wait at: an ego that stands there will not drive.
+EMPTY, CROWDED = Script(200, nobody, testers=0, letters="G"), Script(200, crowd)
 ODD, LONG = Script(50, oddities), Script(6000, nobody, held=True)
 
 
@@ -116,7 +122,7 @@ def drive(
 
     An ego that leaves the driving to SUMO (answers None) keeps its speed.
     """
-    scene = ground.scene(ego.kind, seed)
+    scene = ground.scene(ego.kind, seed, script.testers)
     testers = tuple(
         BodyState(body, start.x, start.y, 0.0, start.o)
         for body, start in zip(scene.bodies, scene.starts, strict=True)
@@ -126,7 +132,7 @@ def drive(
     v = 0.0 if script.held else SPEED if ego.depart_speed is None else ego.depart_speed
     state = BodyState(scene.ego, *_pose(scene, along, v))
     for step in range(script.steps):
-        others, lights = script.others(scene, step), _lights(scene, step)
+        others, lights = script.others(scene, step), _lights(scene, step, script.letters)
         time = round(step * scene.dt, 6)
         snapshot = Snapshot(step, time, state, steering, testers, others, lights)
         command = ego.act(snapshot)
@@ -140,7 +146,8 @@ def drive(
             along += state.v * scene.dt
             state = BodyState(scene.ego, *_pose(scene, along, _speed(state, command, scene.dt)))
         if along >= scene.ego_path.length:
-            return
+            break
+    ego.conclude()
 
 
 def _pose(scene: Scene, along: float, v: float) -> tuple[float, float, float, float]:
@@ -164,10 +171,10 @@ def driven(state: BodyState, action: Action | Drive, dt: float) -> BodyState:
     return BodyState(body, *step_floats(x, y, v, o, throttle, steering, *limits, dt))
 
 
-def _lights(scene: Scene, step: int) -> tuple[str, ...]:
+def _lights(scene: Scene, step: int, letters: str) -> tuple[str, ...]:
     """What the lights show: each its letters in turn."""
     turn = int(step * scene.dt / 3.0)
-    return tuple(LETTERS[(turn + i) % len(LETTERS)] for i in range(len(scene.lights)))
+    return tuple(letters[(turn + i) % len(letters)] for i in range(len(scene.lights)))
 
 
 def _raw(name: str, kind: Kind, x: float, y: float, v: float, o: float) -> RawState:

@@ -226,7 +226,8 @@ int main(void) {
         } else if (is(type, "reset")) {
             printf("{\"type\": \"ready\"}\n");
         } else if (is(type, "observation")) {
-            printf("{\"acceleration\": %.17g}\n", acceleration(line));
+            printf("{\"step\": %.0f, \"acceleration\": %.17g}\n", number(line, "step"),
+                   acceleration(line));
         } else {
             break; /* close */
         }

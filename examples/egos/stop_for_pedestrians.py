@@ -133,7 +133,7 @@ class Driver:
         if kind == "reset":  # nothing is kept from one episode to the next
             return {"type": "ready"}
         if kind == "observation":
-            return {"acceleration": self.decide(message)}
+            return {"step": message["step"], "acceleration": self.decide(message)}
         return None
 
     def begin(self, hello):

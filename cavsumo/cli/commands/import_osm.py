@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import dataclasses
 import gzip
 import shlex
 import sys
 import tempfile
+from collections.abc import Iterator
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
@@ -14,7 +16,7 @@ from cavsumo import __version__
 from cavsumo.errors import Exit, InputError
 from cavsumo.network.facts import Facts, facts
 from cavsumo.network.osm.extract import Box, find_roads, parse_box, write_roads
-from cavsumo.network.osm.handedness import warning
+from cavsumo.network.osm.handedness import Side, side, warning
 from cavsumo.network.osm.netconvert import (
     ODBL,
     OSM_OPTIONS,
@@ -53,7 +55,7 @@ class ImportOptions:
         source: the extract.
         output: the network to write.
         bbox: west, south, east, north as written, or None for all of it.
-        left_hand: traffic keeps left.
+        left_hand: traffic keeps left; None for where the extract lies.
         keep_pedestrian_signals: keep traffic lights that only stop cars for pedestrians.
         zebra: pedestrians have priority on crossings without traffic lights.
         overwrite: replace another network.
@@ -63,7 +65,7 @@ class ImportOptions:
     source: Path
     output: Path
     bbox: str | None
-    left_hand: bool
+    left_hand: bool | None
     keep_pedestrian_signals: bool
     zebra: bool
     overwrite: bool
@@ -75,7 +77,10 @@ def import_osm(order: ImportOptions) -> int:
     _check(order)
     box = None if order.bbox is None else parse_box(order.bbox)
     roads = find_roads(order.source, box)
-    about = warning(roads.hints, box or roads.bounds or (0, 0, 0, 0), order.left_hand)
+    found = side(roads.hints, box or roads.bounds or (0, 0, 0, 0))
+    about = list(_about_side(found, order.left_hand))
+    if order.left_hand is None:
+        order = dataclasses.replace(order, left_hand=found.left and found.certain)
     with tempfile.TemporaryDirectory(prefix="cavsumo-") as name:
         folder = Path(name)
         with (folder / EXTRACT).open("w", encoding="utf-8", newline="\n") as stream:
@@ -88,12 +93,26 @@ def import_osm(order: ImportOptions) -> int:
         made = facts(read_network(folder / NET))
     log = _log_file(order.output)
     _publish(order, network, "".join(f"{line}\n" for line in said), log)
-    remarks = [f"warning: {about}"] if about else []
-    remarks += [f"note: {note}" for note in made.notes]
+    remarks = [*about, *(f"note: {note}" for note in made.notes)]
     for line in [*remarks, *warning_summary(said, log)]:
         print(line if line.startswith(" ") else f"cavsumo: {line}", file=sys.stderr)
     print(_what_was_made(order.output, made))
     return Exit.OK
+
+
+def _about_side(found: Side, asked: bool | None) -> Iterator[str]:
+    """What to say of the side of the road that was asked for or is taken."""
+    if asked is not None or not found.certain:
+        about = warning(found, bool(asked))
+        if about is not None:
+            yield f"warning: {about}"
+        elif asked is None:
+            yield (
+                f"note: {found.words}, but that is not certain: imported for right-hand traffic; "
+                "--left-hand or --right-hand says which it is"
+            )
+    elif found.left:
+        yield f"note: {found.words}: imported for left-hand traffic; --right-hand is the other side"
 
 
 def _check(order: ImportOptions) -> None:

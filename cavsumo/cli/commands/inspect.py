@@ -7,7 +7,7 @@ import io
 import json
 import shlex
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -15,6 +15,7 @@ from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
+from cavsumo.cli.steps import SlowSteps
 from cavsumo.egos.base import EGO_KIND
 from cavsumo.errors import Exit, InputError, NetworkError
 from cavsumo.network.facts import Facts, facts
@@ -57,20 +58,41 @@ def inspect(look: InspectOptions) -> int:
     if look.top < 1:
         raise InputError(f"--top: expected at least 1, got {look.top}")
     draw = _drawing(look.picture)
-    network = read_network(look.net)
-    try:
-        found = facts(network)
-        here = ground(network, EGO_KIND.length / 2)
-        junctions = _junctions(here, look)
-    except ValueError as error:  # shapes without points, widths that are none
-        raise NetworkError(f"network {str(look.net)!r}: {error}") from error
-    if draw is not None:
-        draw(here, junctions[0] if junctions else None, look.picture)
+    with SlowSteps(quiet=draw is None) as steps:
+        found, here, junctions = _seen(look, steps)
+        if draw is not None:
+            steps.begin(f"drawing {look.picture}")
+            unwritten = draw(here, junctions[0] if junctions else None, look.picture)
+            _note_unwritten(unwritten)
     if look.as_json:
         print(json.dumps(as_json(look.net, found, junctions), ensure_ascii=not _utf8(), indent=2))
     else:
         _print(_shown(look, found, junctions))
     return Exit.OK
+
+
+def _seen(look: InspectOptions, steps: SlowSteps) -> tuple[Facts, InspectedNetwork, list[Junction]]:
+    """What there is to see of a network."""
+    steps.begin(f"reading {look.net}")
+    network = read_network(look.net)
+    try:
+        found = facts(network)
+        here = ground(network, EGO_KIND.length / 2)
+        steps.begin("looking for junctions that testers reach")
+        return found, here, _junctions(here, look)
+    except ValueError as error:  # shapes without points, widths that are none
+        raise NetworkError(f"network {str(look.net)!r}: {error}") from error
+
+
+def _note_unwritten(names: Sequence[str]) -> None:
+    """Say which names of streets are not in the picture."""
+    if names:
+        said = _printable(", ".join(names))
+        print(
+            f"cavsumo: note: no font on this machine can write {said}, which the picture lacks; "
+            "fonts such as Noto Sans CJK have many letters",
+            file=sys.stderr,
+        )
 
 
 def _junctions(here: InspectedNetwork, look: InspectOptions) -> list[Junction]:
@@ -158,8 +180,13 @@ def _utf8() -> bool:
 
 def _print(text: str) -> None:
     """Print on stdout, whatever letters it can write."""
+    print(_printable(text), end="")
+
+
+def _printable(text: str) -> str:
+    """A text with the letters that stdout cannot write escaped."""
     encoding = sys.stdout.encoding or "utf-8"
-    print(text.encode(encoding, "backslashreplace").decode(encoding), end="")
+    return text.encode(encoding, "backslashreplace").decode(encoding)
 
 
 def _shown(look: InspectOptions, found: Facts, junctions: list[Junction]) -> str:
@@ -226,7 +253,10 @@ def _heading(rank: int, j: Junction) -> str:
     """A junction in one line."""
     streets = f" ({', '.join(j.streets)})" if j.streets else ""
     where = "" if j.centre is None else ", at {:.5f}, {:.5f}".format(*j.centre)
-    return f"{rank}. junction {j.id}{streets}: {j.type}, {_count(j.crossings, 'crossing')}{where}"
+    others = [piece for piece in j.pieces if piece != j.id]
+    parts = f", one intersection with {', '.join(others)}" if others else ""
+    crossings = _count(j.crossings, "crossing")
+    return f"{rank}. junction {j.id}{streets}: {j.type}, {crossings}{where}{parts}"
 
 
 def _ways_table(ways: tuple[Way, ...]) -> Table:

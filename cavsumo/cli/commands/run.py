@@ -18,6 +18,7 @@ from cavsumo.batch.stopping import looks_at_rows
 from cavsumo.batch.summary import Ended, summarise
 from cavsumo.batch.worker import try_out
 from cavsumo.egos import make_ego
+from cavsumo.egos.ego_files import OutputWatch
 from cavsumo.errors import CavsumoError, Exit, InputError
 from cavsumo.model.study import Part
 from cavsumo.results.writing import Recorder
@@ -42,8 +43,7 @@ def played(
     """Play batches that were checked; what they came to, and whether that was cut short."""
     ended: list[Ended] = []
     with opened(means) as (executor, jobs), Interrupts(manner.quiet) as interrupts:
-        for batch in batches:
-            _try_out(executor, batch.prepared)
+        batches = [_tried_out(executor, batch) for batch in batches]
         for batch in batches:
             if interrupts() and ended:
                 break
@@ -52,8 +52,18 @@ def played(
     return ended, interrupts() and cut_short
 
 
+def _tried_out(executor: Executor, batch: CheckedBatch) -> CheckedBatch:
+    """Have the batch loaded once, where it will be played; what the ego wrote is no input."""
+    _try_out(executor, batch.prepared)
+    known = batch.prepared.checksums
+    written = OutputWatch(batch.prepared.plan.scenario.ego, known).outputs()
+    if known.keys().isdisjoint(written):
+        return batch
+    return batch.without(written)
+
+
 def _try_out(executor: Executor, prepared: PreparedBatch) -> None:
-    """Have the batch loaded once, where it will be played."""
+    """Have the batch loaded once."""
     try:
         executor.submit(try_out, prepared).result()
     except CavsumoError:

@@ -39,7 +39,14 @@ def add_import_osm(commands: Any) -> None:
     add("source", type=Path, metavar="FILE", help=".osm, .osm.xml, the same as .gz, or .pbf")
     add("-o", "--output", required=True, type=Path, metavar="FILE", help="NAME.net.xml")
     add("--bbox", metavar="W,S,E,N", help="only roads that touch this box, in degrees")
-    add("--left-hand", action="store_true", help="traffic keeps left")
+    hand = osm.add_mutually_exclusive_group().add_argument
+    hand(
+        "--left-hand",
+        action="store_true",
+        default=None,
+        help="traffic keeps left (default: as where the extract lies, right if in doubt)",
+    )
+    hand("--right-hand", dest="left_hand", action="store_false", help="traffic keeps right")
     add("--zebra", action="store_true", help="priority for pedestrians where there are no signals")
     add(
         "--keep-pedestrian-signals",

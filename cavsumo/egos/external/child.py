@@ -11,6 +11,8 @@ from collections.abc import Sequence
 
 from cavsumo.egos.external.link import Link, Tail
 from cavsumo.errors import EgoError
+from cavsumo.model.offspring import kill_descendants
+from cavsumo.model.own_folders import OwnFolder
 from cavsumo.model.processes import ending, leash, outer_environment
 
 GRACE_S = 1.0  # how long it may take to end by itself
@@ -21,7 +23,8 @@ class Child(Link):
     """A command that runs in the group of this process, so that whoever kills that kills it too.
 
     It has three pipes, none of our other descriptors, Python's changes to signals undone, and the
-    environment of the command line.
+    environment of the command line with a temporary folder of its own, by which its daemons are
+    known.
     """
 
     def __init__(self, words: Sequence[str], tail: Tail) -> None:
@@ -31,6 +34,7 @@ class Child(Link):
             put_on_leash()
             signal.signal(signal.SIGINT, signal.SIG_DFL)  # a process of ours ignores it
 
+        self._folder = OwnFolder("ego")
         try:
             self._process = subprocess.Popen(
                 words,
@@ -38,10 +42,11 @@ class Child(Link):
                 stdin=subprocess.PIPE,
                 stdout=subprocess.PIPE,
                 stderr=subprocess.PIPE,
-                env=outer_environment(),
+                env=outer_environment() | {"TMPDIR": self._folder.name},
                 preexec_fn=before_exec,  # this process has no threads
             )
         except (OSError, ValueError, subprocess.SubprocessError) as error:
+            self._folder.close()
             said = getattr(error, "strerror", None) or str(error)
             raise EgoError(f"cannot be started: {said}: {words[0]!r}") from error
         stdin, stdout, stderr = self._process.stdin, self._process.stdout, self._process.stderr
@@ -58,9 +63,11 @@ class Child(Link):
                 os.write(self.sink, farewell)
             self._pipes[0].close()
             self._watch(GRACE_S)
+        kill_descendants(process.pid)
         process.kill()  # also when it is stopped; harmless when it has ended
         with contextlib.suppress(subprocess.TimeoutExpired):
             process.wait(10.0)
+        self._folder.close()
         self.drain()
         for pipe in self._pipes:
             pipe.close()
@@ -69,7 +76,7 @@ class Child(Link):
         code = self._watch(GRACE_S)
         if code is None:
             return "closed its stdin or stdout"
-        last = self.tail.last_line()
+        last = self.tail.telling_line()
         return ending(code) + (f" ({last})" if last else "")
 
     def _watch(self, seconds: float) -> int | None:

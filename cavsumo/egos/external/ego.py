@@ -17,7 +17,8 @@ from cavsumo.egos.base import EGO_KIND, Command, Ego, Mission
 from cavsumo.egos.effectors import checked
 from cavsumo.egos.external import protocol
 from cavsumo.egos.external.child import Child
-from cavsumo.egos.external.link import Link, Tail
+from cavsumo.egos.external.link import ExtraLineError, GoneError, Link, Tail
+from cavsumo.egos.external.protocol import shown
 from cavsumo.egos.external.wire import Wire, host_and_port
 from cavsumo.errors import EgoError, InputError
 from cavsumo.model.checks import number
@@ -77,6 +78,7 @@ class ExternalEgo(Ego, ABC):
         if depart_speed is not None:
             self.depart_speed = number("depart_speed", depart_speed, 0.0, self.kind.v_max)
         self._link: Link | None = None
+        self._ended: EgoError | None = None  # between two episodes
         self._tail = Tail()
 
     @abstractmethod
@@ -101,23 +103,49 @@ class ExternalEgo(Ego, ABC):
 
     def reset(self, scene: Scene) -> None:
         self._sort: type | None = None
+        self._time, self._named = 0.0, True
         self._observations = protocol.Observations(scene)
+        self._reset = protocol.reset(scene.seed)
         try:
-            link = self._link or self._open()
-            protocol.check_ready(link.ask(protocol.reset(scene.seed), self.start_s))
+            self._begin()
         except EgoError as error:
-            raise self._given_up("reset", 0.0, error) from error
+            raise self._given_up(" (reset)", error) from error
 
     def act(self, snapshot: Snapshot) -> Command:
         assert self._link is not None  # or reset has raised
+        self._time = snapshot.time
         try:
             reply = self._link.ask(self._observations.line(snapshot), self.reply_s)
-            command = protocol.command(reply)
+            command, named = protocol.answer(reply, snapshot.step)
             checked(command, self._sort, self.kind, protocol.names(command))
         except EgoError as error:
-            raise self._given_up("act", snapshot.time, error) from error
-        self._sort = type(command)
+            raise self._given_up("", error) from error
+        self._sort, self._named = type(command), self._named and named
         return command
+
+    def conclude(self) -> None:
+        """Make sure that each answer was that to its observation, if they did not say so.
+
+        A second answer that came late would have been taken for the next one. Asked to begin
+        again, the ego has said all that it had to say about this episode.
+        """
+        if self._link is None or self._named:
+            return
+        self._link.drain()
+        log = self._tail.state()
+        try:
+            left = self._left_over(self._link)
+            self._link.drain()
+            if left:
+                raise EgoError(f"answered more often than it was asked: {shown(left)} is left over")
+        except GoneError as error:  # its answers are all there: the next episode will have none
+            self._drop()
+            self._ended = error
+        except EgoError as error:
+            raise self._given_up(" (end)", error) from error
+        else:
+            self._named = True
+            self._tail.back_to(log)  # it may say that it begins again, and no episode does
 
     def take_log(self) -> str:
         if self._link is not None:
@@ -134,11 +162,40 @@ class ExternalEgo(Ego, ABC):
             raise
         return self._link
 
-    def _given_up(self, what: str, time: float, error: EgoError) -> EgoError:
+    def _begin(self) -> None:
+        """Begin an episode, in a new conversation if the old one is spoilt.
+
+        Lines that lie in the old one before this episode begins are no fault of it.
+        """
+        if self._ended is not None:
+            error, self._ended = self._ended, None
+            raise error
+        if self._link is not None:
+            left = self._left_over(self._link)
+            if not left:
+                return
+            note = f"[cavsumo: {shown(left)} was written before this episode; begun anew]\n"
+            self._tail.add(note.encode())
+            self._drop()
+        protocol.check_ready(self._open().ask(self._reset, self.start_s))
+
+    def _left_over(self, link: Link) -> bytes:
+        """Ask the ego to begin an episode: the line that it wrote about the one before, if any."""
+        try:
+            reply = link.ask(self._reset, self.start_s)
+        except ExtraLineError as error:
+            if protocol.is_ready(error.line):
+                raise
+            return error.line or b"\n"
+        if protocol.is_left_over(reply):
+            return reply
+        protocol.check_ready(reply)
+        return b""
+
+    def _given_up(self, when: str, error: EgoError) -> EgoError:
         """The error of an episode, its conversation ended."""
         self._drop()
-        during = " (reset)" if what == "reset" else ""
-        return EgoError(f"ego {self.spec} at {time:.2f} s{during}: {error}")
+        return EgoError(f"ego {self.spec} at {self._time:.2f} s{when}: {error}")
 
     def _drop(self) -> None:
         """End the process or connection at once."""

@@ -13,12 +13,29 @@ import select
 import time
 from abc import ABC, abstractmethod
 
+from cavsumo.egos.external.last_words import telling_line
 from cavsumo.egos.external.protocol import shown
 from cavsumo.errors import EgoError
 
 LINE_LIMIT = 65536  # bytes of a reply, its end not counted
 LOG_LIMIT = 65536  # bytes kept of what it writes to its stderr
 CHUNK = 65536
+
+
+class ExtraLineError(EgoError):
+    """The ego wrote more lines than it was asked for.
+
+    Attributes:
+        line: the first line that came, which may be an answer; what there is of it.
+    """
+
+    def __init__(self, message: str, line: bytes) -> None:
+        super().__init__(message)
+        self.line = line
+
+
+class GoneError(EgoError):
+    """The ego ended, or is silent."""
 
 
 class Tail:
@@ -42,11 +59,17 @@ class Tail:
         self._data, self._cut = bytearray(), 0
         return note + text
 
-    def last_line(self) -> str:
-        """The last line that is not blank, shortened; empty for none."""
-        text = self._data[-1000:].decode("utf-8", errors="replace")
-        lines = [line.strip() for line in text.splitlines() if line.strip()]
-        return lines[-1][:200] if lines else ""
+    def state(self) -> tuple[bytes, int]:
+        """What is there now, to come back to."""
+        return bytes(self._data), self._cut
+
+    def back_to(self, state: tuple[bytes, int]) -> None:
+        """Forget what came since a state."""
+        self._data, self._cut = bytearray(state[0]), state[1]
+
+    def telling_line(self) -> str:
+        """The line that says why its writer ended, shortened; empty for none."""
+        return telling_line(self._data.decode("utf-8", errors="replace"))
 
 
 class Link(ABC):
@@ -69,11 +92,12 @@ class Link(ABC):
         self._writing.register(sink, both)
 
     def ask(self, line: bytes, seconds: float) -> bytes:
-        """The one line that answers a line; raises EgoError for anything else."""
+        """The one line that answers a line; raises EgoError for anything else.
+
+        That is ExtraLineError for a second line and GoneError for none.
+        """
         deadline = time.monotonic() + seconds
-        unasked = self._read()
-        if unasked:
-            raise EgoError(f"wrote {shown(unasked)} before it was asked")
+        self._check_unasked()
         self._send(line, deadline, seconds)
         return self._receive(deadline, seconds)
 
@@ -101,13 +125,18 @@ class Link(ABC):
             except BlockingIOError:
                 pass
             except OSError:
-                raise EgoError(self._gone()) from None
+                raise GoneError(self._gone()) from None
             if not left:
                 return
             if not self._wait(self._writing, deadline):
                 raise EgoError(f"did not read its input within {seconds:g} s")
-            if unasked := self._read():
-                raise EgoError(f"wrote {shown(unasked)} before it was asked")
+            self._check_unasked()
+
+    def _check_unasked(self) -> None:
+        """Raise ExtraLineError if something was written that nobody asked for."""
+        if unasked := self._read():
+            said = f"wrote {shown(unasked)} before it was asked"
+            raise ExtraLineError(said, unasked.partition(b"\n")[0])
 
     def _receive(self, deadline: float, seconds: float) -> bytes:
         """The line that comes."""
@@ -119,11 +148,11 @@ class Link(ABC):
             if len(line) > LINE_LIMIT:
                 raise EgoError(f"answered with a line longer than {LINE_LIMIT} bytes")
             if more:
-                raise EgoError(f"wrote {shown(more)} after its answer")
+                raise ExtraLineError(f"wrote {shown(more)} after its answer", line)
             if end:
                 return line
             if not in_time:
-                raise EgoError(f"gave no answer within {seconds:g} s")
+                raise GoneError(f"gave no answer within {seconds:g} s")
 
     def _wait(self, poll: select.poll, deadline: float) -> bool:
         """Wait until something can be read or written; whether there is time left then."""
@@ -142,7 +171,7 @@ class Link(ABC):
         except OSError:
             chunk = b""
         if not chunk:
-            raise EgoError(self._gone())
+            raise GoneError(self._gone())
         return chunk
 
     def _read_errors(self) -> None:

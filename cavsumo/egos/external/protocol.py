@@ -18,6 +18,7 @@ from cavsumo.model.snapshot import RawState, Snapshot
 
 PROTOCOL, VERSION = "cavsumo-ego", 1
 CLOSE = b'{"type":"close"}\n'
+_COMMAND = frozenset({"acceleration", "throttle", "steering", "step"})  # keys of an answer
 SHOWN = 80  # characters of a reply that a message quotes
 # SUMO's letters of a traffic light (its documentation, "Traffic Lights", signal state definitions).
 LIGHTS = {
@@ -145,9 +146,44 @@ def check_ready(line: bytes) -> None:
     _typed(line, "ready")
 
 
+def is_ready(line: bytes) -> bool:
+    """Whether this answers a reset."""
+    try:
+        check_ready(line)
+    except EgoError:
+        return False
+    return True
+
+
+def is_left_over(line: bytes) -> bool:
+    """Whether this answers an observation, where a reset should have been answered."""
+    try:
+        return not _COMMAND.isdisjoint(_object(line))
+    except EgoError:
+        return False
+
+
+def answer(line: bytes, step: int) -> tuple[Acceleration | Drive, bool]:
+    """The command in the answer to the observation of a timestep, and whether it names that.
+
+    Raises EgoError when it names another one; an answer need not say which it is.
+    """
+    reply = _object(line)
+    if "step" not in reply:
+        return _command(line, reply), False
+    named = reply["step"]
+    if isinstance(named, bool) or named != step:
+        raise EgoError(f"answered step {_quoted(named)} when asked for step {step}")
+    return _command(line, reply), True
+
+
 def command(line: bytes) -> Acceleration | Drive:
     """The command in the answer to an observation; its numbers may be out of range."""
-    reply = _object(line)
+    return _command(line, _object(line))
+
+
+def _command(line: bytes, reply: dict[str, Any]) -> Acceleration | Drive:
+    """The command of a reply."""
     accelerates = "acceleration" in reply
     if accelerates is ("throttle" in reply or "steering" in reply):
         raise EgoError(

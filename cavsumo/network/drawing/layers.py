@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Sequence
+from functools import cache
 from typing import Any
 
 import shapely
@@ -44,6 +45,8 @@ SIGNAL_DOTS: dict[str, Any] = {
     "mec": "white",
     "mew": 0.8,
 }
+BOXES = "Last Resort"  # fonts that have a box for every letter
+LETTER = 0.0075  # width of a letter of a street's name, as part of the picture's height
 BESIDE_M = {"straight": 0.0, "left": 0.5, "right": -0.5, "u-turn": 1.0}  # routes are drawn apart
 
 
@@ -72,22 +75,26 @@ def lane_color(lane: Any) -> str:
 def _draw_names(axes: Axes, here: InspectedNetwork, window: shapely.Geometry) -> None:
     """Each street's name, where most of it is seen."""
     best: dict[str, LineString] = {}
+    letter_m = LETTER * (window.bounds[3] - window.bounds[1])
     for edge in here.network.edges:
-        name, line = street(edge), LineString(edge.getShape()).intersection(window)
-        seen = line.geom_type == "LineString" and line.length > 3.0 * len(name)
-        if (
-            name
-            and seen
-            and has_glyphs(name)
-            and line.length > getattr(best.get(name), "length", 0)
-        ):
+        name, line = street(edge), _longest(LineString(edge.getShape()).intersection(window))
+        if not name or line is None or line.length <= letter_m * len(name):
+            continue
+        if font_for(name) and line.length > getattr(best.get(name), "length", 0):
             best[name] = line
     for name, line in best.items():
         where, ahead = line.interpolate(line.length / 2), line.interpolate(line.length / 2 + 1.0)
         angle = math.degrees(math.atan2(ahead.y - where.y, ahead.x - where.x))
-        text = axes.text(where.x, where.y, name, fontsize=8, color="#222222", zorder=9)
+        text = axes.text(where.x, where.y, name, color="#222222", zorder=9, font=font_for(name))
+        text.set_fontsize(8)
         text.set(rotation=(angle + 90) % 180 - 90, ha="center", va="center", rotation_mode="anchor")
         text.set_path_effects([withStroke(linewidth=2.5, foreground="white", alpha=0.8)])
+
+
+def _longest(shape: shapely.Geometry) -> LineString | None:
+    """The longest piece of what is left of a line."""
+    lines = [part for part in getattr(shape, "geoms", [shape]) if part.geom_type == "LineString"]
+    return max(lines, key=lambda line: line.length, default=None)
 
 
 def draw_crossings(axes: Axes, here: InspectedNetwork, view: Box) -> None:
@@ -159,7 +166,27 @@ def draw_routes(axes: Axes, ways: Sequence[Way]) -> None:
         axes.add_patch(arrow)
 
 
-def has_glyphs(text: str) -> bool:
-    """Whether the font can write a text; without its letters only boxes would be seen."""
-    known = FT2Font(font_manager.findfont(font_manager.FontProperties())).get_charmap()
-    return all(ord(letter) in known for letter in text)
+@cache
+def font_for(text: str) -> font_manager.FontProperties | None:
+    """A font that can write a text, the usual one if it can; without its letters boxes are seen."""
+    usual = font_manager.FontProperties()
+    if _can_write(font_manager.findfont(usual), text):
+        return usual
+    entries = font_manager.fontManager.ttflist
+    files = sorted({entry.fname for entry in entries if BOXES not in entry.name})
+    able = (file for file in files if _can_write(file, text))
+    return next((font_manager.FontProperties(fname=file) for file in able), None)
+
+
+def _can_write(file: str, text: str) -> bool:
+    """Whether a font has all letters of a text."""
+    try:
+        return set(map(ord, text)) <= _letters(file)
+    except (OSError, RuntimeError):  # one that was removed, or is damaged
+        return False
+
+
+@cache
+def _letters(file: str) -> frozenset[int]:
+    """The letters of a font."""
+    return frozenset(FT2Font(file).get_charmap())

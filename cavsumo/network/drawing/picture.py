@@ -33,7 +33,7 @@ from cavsumo.network.drawing.layers import (
     draw_crossings,
     draw_routes,
     draw_surfaces,
-    has_glyphs,
+    font_for,
     lane_color,
 )
 from cavsumo.network.drawing.surfaces import credit
@@ -50,8 +50,11 @@ CROSSING_LABELS = {
 }
 
 
-def draw(here: InspectedNetwork, junction: Junction | None, file: Path) -> None:
-    """Draw a junction, or the whole network when there is none; raises InputError."""
+def draw(here: InspectedNetwork, junction: Junction | None, file: Path) -> list[str]:
+    """Draw a junction, or the whole network when there is none; raises InputError.
+
+    Returns the names of its streets that no font here can write.
+    """
     ways = junction.ways if junction else ()
     view = _view(here, ways)
     ratio = min(2.0, max(0.7, (view[2] - view[0]) / (view[3] - view[1])))
@@ -67,8 +70,8 @@ def draw(here: InspectedNetwork, junction: Junction | None, file: Path) -> None:
     source = credit(here.network.file)
     if source:
         axes.text(0.995, 0.01, source, transform=axes.transAxes, ha="right", fontsize=7, zorder=11)
-    streets, name = _titles(here, junction)
-    axes.set_title(f"{streets}\n" if streets else "", loc="left", fontsize=13)
+    title, name = _titles(here, junction)
+    axes.set_title(f"{title}\n", loc="left", font=font_for(title), size=13)
     axes.text(0, 1.012, name, transform=axes.transAxes, fontsize=8, color="#444444")
     axes.legend(
         handles=_legend(here, ways), loc="upper left", bbox_to_anchor=(1.0, 1.0), frameon=False
@@ -79,6 +82,7 @@ def draw(here: InspectedNetwork, junction: Junction | None, file: Path) -> None:
         figure.savefig(file, bbox_inches="tight", pad_inches=0.15, metadata=metadata)
     except OSError as error:
         raise InputError(f"--picture {str(file)!r}: {error.strerror}") from error
+    return [name for name in (junction.streets if junction else ()) if not font_for(name)]
 
 
 def _view(here: InspectedNetwork, ways: Sequence[Way]) -> Box:
@@ -110,12 +114,15 @@ def _draw_scale(axes: Axes, view: Box) -> None:
 
 
 def _titles(here: InspectedNetwork, junction: Junction | None) -> tuple[str, str]:
-    """The streets, and the junction's id, as far as the font has the letters."""
+    """The title, and a line below it: streets if they have names that can be written, and ids."""
     file = here.network.file.name
     if junction is None:
-        return "", file
-    streets = " / ".join(name for name in junction.streets if has_glyphs(name))
-    return streets, f"junction {junction.id}, {file}"
+        return file, "the whole network"
+    ids = f"junction {junction.id}"
+    names = [name for name in junction.streets if font_for(name)]
+    while names and not font_for(" / ".join(names)):  # each in a font of its own
+        names.pop()
+    return " / ".join(names) or ids, f"{ids}, {file}"
 
 
 def _legend(here: InspectedNetwork, ways: Sequence[Way]) -> list[Any]:

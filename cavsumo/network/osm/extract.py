@@ -10,14 +10,15 @@ import bz2
 import gzip
 import zlib
 from collections import Counter
-from collections.abc import Collection, Iterator, Mapping
+from collections.abc import Container, Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, TextIO
+from typing import Any, NamedTuple, TextIO
 from xml.etree import ElementTree
 from xml.sax.saxutils import quoteattr
 
 from cavsumo.errors import InputError
+from cavsumo.network.osm.xml_stream import Element, read_elements
 
 Box = tuple[float, float, float, float]  # west, south, east, north [degrees]
 DIGITS = 7  # decimals of a coordinate in OpenStreetMap
@@ -25,6 +26,7 @@ EXTRA = "pip install 'cavsumo[osm]'"
 OPENERS = {b"\x1f\x8b": gzip.open, b"BZ": bz2.open}
 # Tracks are not driven on, but they divide the roads that they cross or lie in.
 TRACKS = frozenset({"highway", "railway"})
+SIDES, COUNTRIES = ("left", "right"), ("addr:country", "is_in:country_code")
 # Tags whose values begin with the code of the country that made the rule.
 RULES = ("traffic_sign", "source:maxspeed", "maxspeed:type", "zone:traffic", "zone:maxspeed")
 KINDS = {"n": "node", "w": "way", "r": "relation"}
@@ -85,42 +87,67 @@ def parse_box(text: str) -> Box:
 
 
 def find_roads(file: Path, box: Box | None) -> RoadExtract:
-    """The roads of an extract, whole, that touch the box; raises InputError when there are none."""
-    found, places = RoadExtract(), dict[int, tuple[float, float]]()
-    tracks: list[tuple[Item, bool]] = []  # ways, and whether they are roads
-    for item in read_items(file):  # in any order: Overpass may put ways before their nodes
-        _note_hints(item, found.hints)
-        if item.kind == "node":
-            places[item.id] = (float(item.lon), float(item.lat))
-        elif item.kind == "way" and not TRACKS.isdisjoint(item.tags):
-            tracks.append((item, "highway" in item.tags))
-    if not any(road for _, road in tracks):
+    """The roads of an extract, whole, that touch the box; raises InputError when there are none.
+
+    Read twice, because nodes may stand before the ways that use them or behind (Overpass), and
+    only those of roads and tracks are kept.
+    """
+    found = RoadExtract()
+    tracks = _tracks(file, found)
+    if not any(track.is_road for track in tracks):
         raise InputError(f"extract {str(file)!r}: holds no roads (no way has the tag highway)")
-    found.bounds = _bounds(places.values())
+    inside = _nodes_within(file, {ref for track in tracks for ref in track.refs}, box)
     near = False
-    for way, road in tracks:
-        if any(_within(places.get(ref), box) for ref in way.refs):
-            found.ways.add(way.id)
-            found.nodes.update(way.refs)
-            near = near or road
+    for track in tracks:
+        if not inside.isdisjoint(track.refs):
+            found.ways.add(track.id)
+            found.nodes.update(track.refs)
+            near = near or track.is_road
     if not near:
         raise InputError(f"extract {str(file)!r}: {_off_the_data(box, found.bounds)}")
     return found
 
 
-def _bounds(places: Collection[tuple[float, float]]) -> Box | None:
-    """West, south, east, north of places; None without any."""
-    if not places:
-        return None
-    lons, lats = zip(*places, strict=True)
-    return min(lons), min(lats), max(lons), max(lats)
+class _Track(NamedTuple):
+    """A road or track: its way's id, its nodes, and whether it is a road."""
+
+    id: int
+    refs: tuple[int, ...]
+    is_road: bool
 
 
-def _within(place: tuple[float, float] | None, box: Box | None) -> bool:
-    """Whether a place is known and lies in the box, if there is one."""
-    if place is None or box is None:
-        return place is not None
-    return box[0] <= place[0] <= box[2] and box[1] <= place[1] <= box[3]
+def _tracks(file: Path, found: RoadExtract) -> list[_Track]:
+    """The roads and tracks of an extract; what it says about where it is goes into ``found``."""
+    tracks = []
+    for item in read_items(file):
+        _note_hints(item, found.hints)
+        if item.kind == "node":
+            found.bounds = _widened(found.bounds, float(item.lon), float(item.lat))
+        elif item.kind == "way" and not TRACKS.isdisjoint(item.tags):
+            tracks.append(_Track(item.id, item.refs, "highway" in item.tags))
+    return tracks
+
+
+def _nodes_within(file: Path, wanted: Container[int], box: Box | None) -> set[int]:
+    """Which of the nodes wanted are there and lie in the box, if there is one."""
+    return {
+        item.id
+        for item in read_items(file)
+        if item.kind == "node"
+        and item.id in wanted
+        and _within((float(item.lon), float(item.lat)), box)
+    }
+
+
+def _widened(bounds: Box | None, lon: float, lat: float) -> Box:
+    """The bounds with one more place in them."""
+    west, south, east, north = bounds or (lon, lat, lon, lat)
+    return min(west, lon), min(south, lat), max(east, lon), max(north, lat)
+
+
+def _within(place: tuple[float, float], box: Box | None) -> bool:
+    """Whether a place lies in the box, if there is one."""
+    return box is None or (box[0] <= place[0] <= box[2] and box[1] <= place[1] <= box[3])
 
 
 def write_roads(file: Path, roads: RoadExtract, target: TextIO) -> None:
@@ -166,44 +193,24 @@ def _xml_items(file: Path) -> Iterator[Item]:
     with file.open("rb") as raw:
         opener: Any = OPENERS.get(raw.read(2), open)
     with opener(file, "rb") as stream:
-        root: Any = None
-        for event, element in ElementTree.iterparse(stream, events=("start", "end")):
-            if root is None:
-                root = element
-                _check_root(file, root.tag)
-            elif event == "end" and element.tag in ("node", "way", "relation"):
-                if element.get("action") != "delete" and element.get("visible") != "false":
-                    yield _from_xml(element)
-                root.clear()
-            elif event == "end" and element.tag == "remark":
-                raise InputError(f"extract {str(file)!r}: is incomplete: {element.text}")
+        for element in read_elements(stream, str(file)):
+            said = element.attrib
+            if said.get("action") != "delete" and said.get("visible") != "false":
+                yield _from_xml(element)
 
 
-def _check_root(file: Path, tag: str) -> None:
-    """Refuse XML that is something else."""
-    if tag != "osm":
-        raise InputError(
-            f"extract {str(file)!r}: an OpenStreetMap extract begins with <osm>, this file with "
-            f"<{tag}>"
-        )
-
-
-def _from_xml(element: ElementTree.Element) -> Item:
+def _from_xml(element: Element) -> Item:
     """An item from its element."""
-    kind, number = element.tag, int(element.attrib["id"])
-    tags = {tag.attrib["k"]: tag.attrib["v"] for tag in element.findall("tag")}
+    kind, number, parts = element.tag, int(element.attrib["id"]), element.parts
+    tags = {tag["k"]: tag["v"] for tag in parts["tag"]}
     if kind == "node":
         lat, lon = element.attrib["lat"], element.attrib["lon"]
         if not (abs(float(lat)) <= 90 and abs(float(lon)) <= 180):
             raise ValueError(f"node {number} at {lat}, {lon}")
         return Item(kind, number, tags, lat, lon)
     if kind == "way":
-        refs = tuple(int(nd.attrib["ref"]) for nd in element.findall("nd"))
-        return Item(kind, number, tags, refs=refs)
-    members = tuple(
-        (m.attrib["type"], int(m.attrib["ref"]), m.get("role", ""))
-        for m in element.findall("member")
-    )
+        return Item(kind, number, tags, refs=tuple(int(nd["ref"]) for nd in parts["nd"]))
+    members = tuple((m["type"], int(m["ref"]), m.get("role", "")) for m in parts["member"])
     return Item(kind, number, tags, members=members)
 
 
@@ -241,9 +248,8 @@ def _is_kept(item: Item, roads: RoadExtract) -> bool:
     if item.kind == "way":
         return item.id in roads.ways
     kept = {"node": roads.nodes, "way": roads.ways}
-    return item.tags.get("type") == "restriction" and all(
-        ref in kept.get(kind, ()) for kind, ref, _ in item.members
-    )
+    whole = bool(item.members) and all(ref in kept.get(kind, ()) for kind, ref, _ in item.members)
+    return whole and item.tags.get("type") == "restriction"
 
 
 def _xml(item: Item) -> Iterator[str]:
@@ -262,10 +268,15 @@ def _xml(item: Item) -> Iterator[str]:
 def _note_hints(item: Item, hints: Counter[tuple[str, str]]) -> None:
     """Count the tags that tell the side of the road or the country."""
     for key, value in item.tags.items():
-        if key in ("driving_side", "addr:country", "is_in:country_code"):
+        if (key == "driving_side" and value in SIDES) or (key in COUNTRIES and _is_code(value)):
             hints[key, value] += 1
-        elif key in RULES and value[2:3] == ":":  # GB:nsl_single, DE:274.1
+        elif key in RULES and value[2:3] == ":" and _is_code(value[:2]):  # GB:nsl, DE:274.1
             hints[key, value[:2]] += 1
+
+
+def _is_code(text: str) -> bool:
+    """Whether a text may be the code of a country."""
+    return len(text) == 2 and text.isascii() and text.isalpha()
 
 
 def _off_the_data(box: Box | None, bounds: Box | None) -> str:

@@ -1,0 +1,57 @@
+"""The line of a program's last output that says why it ended.
+
+Most programs say it in their last line. Some runtimes print more behind it: node its version and
+the stack, Java the stack, Go the goroutines, Rust a hint. Then the message stands above that.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+
+LONGEST = 200  # characters of a line that is quoted
+REACH = 20  # lines of a message above its last one
+
+# Last lines behind which a runtime has hidden its message.
+_END = re.compile(
+    r"Node\.js v\d|[)\]}]+,?$"  # node: its version, an object that it shows
+    r"|\s+at |\s+\.\.\. \d+ more$"  # stacks of node and Java
+    r"|exit status \d+$|\s+\S+\.go:\d+"  # Go
+    r"|note: .*RUST_BACKTRACE"  # Rust
+)
+# Further lines of the same that are not indented, as most of them are.
+_BEHIND = re.compile(
+    r"\s|\(Use `node |goroutine \d+ |created by |[\w./*()]+\(.*\)$|stack backtrace:$"
+)
+_HEAD = re.compile(r"Uncaught |Caused by: |Exception in thread |[\w.$]*(Error|Exception)\b|panic: ")
+
+
+def telling_line(text: str) -> str:
+    """The line that says why a program ended, shortened; empty when nothing is said."""
+    lines = [line for line in text.splitlines() if line.strip()]
+    if not lines:
+        return ""
+    message = [i for i, line in enumerate(lines) if not _is_behind(line)]
+    if not _END.match(lines[-1]) or not message:
+        return _shown(lines[-1])
+    return _shown(_first_line(lines, message[-1]))
+
+
+def _is_behind(line: str) -> bool:
+    """Whether a line stands behind a message: stacks, and what else a runtime prints there."""
+    return bool(_END.match(line) or _BEHIND.match(line))
+
+
+def _first_line(lines: Sequence[str], last: int) -> str:
+    """The line with which a message of several lines begins, from the place of its last one."""
+    for line in reversed(lines[max(0, last - REACH) : last + 1]):
+        if _is_behind(line):
+            break
+        if _HEAD.match(line):
+            return line
+    return lines[last]
+
+
+def _shown(line: str) -> str:
+    """A line as a message quotes it."""
+    return line.strip()[:LONGEST]

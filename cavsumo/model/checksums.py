@@ -1,0 +1,17 @@
+"""The checksum by which a file is known again."""
+
+from __future__ import annotations
+
+import hashlib
+from pathlib import Path
+
+from cavsumo.errors import InputError
+
+
+def checksum(file: Path) -> str:
+    """The SHA-256 of a file, which may be large."""
+    try:
+        with file.open("rb") as stream:
+            return hashlib.file_digest(stream, "sha256").hexdigest()
+    except OSError as error:
+        raise InputError(f"{str(file)!r}: cannot be read: {error.strerror}") from error

@@ -1,0 +1,97 @@
+"""The processes that a process of ours has started, directly or not, found and ended (Linux).
+
+A program may leave its parent: it forks twice, takes a session of its own, and belongs to nobody.
+Two things still tell whose it is. A process that adopts orphans becomes the parent of what its
+descendants leave behind; and everybody inherits the environment, in which TMPDIR names a folder
+that was made for one process.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import signal
+import sys
+from collections.abc import Callable, Iterable, Iterator
+from pathlib import Path
+
+PR_SET_CHILD_SUBREAPER = 36  # Linux, prctl(2)
+PROC = Path("/proc")
+ROUNDS = 100  # in which what was killed may have started something else
+
+
+def adopt_orphans() -> None:
+    """Become the parent of whatever the descendants of this process leave behind."""
+    if sys.platform == "linux":
+        import ctypes
+
+        ctypes.CDLL(None).prctl(PR_SET_CHILD_SUBREAPER, 1)
+
+
+def kill_descendants(parent: int) -> None:
+    """Kill all descendants of a process, not the process, until none is left to be killed."""
+    _kill_until_none(lambda: descendants(parent))
+
+
+def kill_those_with(tmpdir: str) -> None:
+    """Kill the processes whose environment names that temporary folder, but for this one."""
+    _kill_until_none(lambda: _with_environment(b"TMPDIR=" + os.fsencode(tmpdir)))
+
+
+def descendants(parent: int) -> list[int]:
+    """The descendants of a process; those that have ended and are not yet buried are none."""
+    children: dict[int, list[int]] = {}
+    alive = set()
+    for pid, above, state in _processes():
+        children.setdefault(above, []).append(pid)
+        if state not in "ZX":
+            alive.add(pid)
+    found: list[int] = []
+    waiting = children.get(parent, [])
+    while waiting:
+        found += waiting
+        waiting = [child for pid in waiting for child in children.get(pid, [])]
+    return [pid for pid in found if pid in alive]
+
+
+def _kill_until_none(find: Callable[[], Iterable[int]]) -> None:
+    """Kill what is found, and look again, because it may have started something meanwhile."""
+    for _ in range(ROUNDS):
+        killed = [pid for pid in find() if _killed(pid)]
+        for pid in killed:
+            with contextlib.suppress(ChildProcessError):  # only those adopted are ours to bury
+                os.waitpid(pid, 0)
+        if not killed:
+            return
+
+
+def _killed(pid: int) -> bool:
+    """Kill a process; False for one that is gone, or not ours to kill."""
+    try:
+        os.kill(pid, signal.SIGKILL)
+    except (ProcessLookupError, PermissionError):
+        return False
+    return True
+
+
+def _processes() -> Iterator[tuple[int, int, str]]:
+    """The number, the parent's number and the state of every process."""
+    for pid in _numbers():
+        with contextlib.suppress(OSError):
+            state, above = (PROC / str(pid) / "stat").read_bytes().rpartition(b")")[2].split()[:2]
+            yield pid, int(above), state.decode()
+
+
+def _with_environment(entry: bytes) -> Iterator[int]:
+    """The processes that were started with an entry in their environment."""
+    for pid in _numbers():
+        with contextlib.suppress(OSError):
+            environment = (PROC / str(pid) / "environ").read_bytes()
+            if pid != os.getpid() and entry in environment.split(b"\0"):
+                yield pid
+
+
+def _numbers() -> Iterator[int]:
+    """The numbers of all processes, none where the system does not list them."""
+    with contextlib.suppress(OSError):
+        yield from (int(entry.name) for entry in PROC.iterdir() if entry.name.isdecimal())
