@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import math
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -13,14 +14,26 @@ import pytest
 import shapely
 from shapely.geometry import LineString, Polygon
 
+from cavsumo.batch.episode_runner import EpisodeRunner
+from cavsumo.batch.jobs import job
 from cavsumo.errors import NetworkError
 from cavsumo.model.bodies import KINDS, PEDESTRIAN, Kind
 from cavsumo.model.carriageway import BEYOND_M, Crossing, Roads, Start
 from cavsumo.model.geometry import Box, corners
 from cavsumo.model.polyline import Path as Polyline
-from cavsumo.network.pedestrian_starts import APART_M, NEAR_M, StartingArea, draw_starts
-from cavsumo.network.reader import read_network
+from cavsumo.model.seeds import starts_generator
+from cavsumo.model.stopping_way import is_clear
+from cavsumo.network.pedestrian_starts import (
+    APART_M,
+    NEAR_M,
+    StartingArea,
+    clear_starts,
+    draw_starts,
+    room,
+)
+from cavsumo.network.reader import lane_shape, read_network
 from cavsumo.network.site import Site
+from cavsumo.simulation.loop import EpisodeLoop
 
 Staged = Callable[..., Any]
 ALL = pytest.mark.parametrize("name", ["pedestrians", "crossing", "junction"])
@@ -219,6 +232,75 @@ def test_testers_keep_apart_at_the_start(staged: Staged, name: str) -> None:
         spots = [(s.x, s.y) for s in trio]
         assert min(math.dist(spots[i], spots[i - 1]) for i in range(3)) > APART_M
     assert 2 * PEDESTRIAN.reach < APART_M
+
+
+@ALL
+def test_testers_have_room_to_stop_before_each_other(staged: Staged, name: str) -> None:
+    """Also those that walk towards each other."""
+    for trio in draws(staged(name)[1]):
+        for i, start in enumerate(trio):
+            rooms = [room(other, PEDESTRIAN) for other in trio[:i]]
+            assert is_clear(room(start, PEDESTRIAN), rooms)
+
+
+def test_a_start_in_a_car_is_drawn_again() -> None:
+    """And nobody else's; the same generator gives the same start."""
+    area = StartingArea(Polyline([(0.0, 0.0), (60.0, 0.0)]), 0.0, 60.0, 4.0, ("edge",))
+    kinds = TRIO
+    for seed in range(30):
+        starts = draw_starts([area], kinds, np.random.default_rng(seed))
+        hit = starts[seed % 3]
+        cars = [Box(hit.x, hit.y, 0.3, 4.5, 1.8), Box(30.0, 0.0, 0.0, 4.5, 1.8)]
+        again = [
+            clear_starts([area], kinds, starts, cars, np.random.default_rng(7)) for _ in range(2)
+        ]
+        assert again[0] == again[1]
+        rooms = [room(start, PEDESTRIAN) for start in again[0]]
+        assert all(is_clear(one, cars) for one in rooms)
+        kept = [is_clear(room(start, PEDESTRIAN), cars) for start in starts]
+        assert [a == b for a, b in zip(starts, again[0], strict=True)] == kept
+        spots = [(s.x, s.y) for s in again[0]]
+        assert min(math.dist(spots[i], spots[i - 1]) for i in range(3)) > APART_M
+
+
+def test_a_start_is_moved_along_where_no_draw_helps() -> None:
+    """A lorry on nearly all of a long pavement leaves one end; one on all of it leaves none."""
+    area = StartingArea(Polyline([(0.0, 0.0), (2000.0, 0.0)]), 0.0, 2000.0, 2.0, ("edge",))
+    starts = draw_starts([area], [PEDESTRIAN], np.random.default_rng(1))
+    long = Box(1003.0, 0.0, 0.0, 1996.0, 3.0)
+    (start,) = clear_starts([area], [PEDESTRIAN], starts, [long], np.random.default_rng(1))
+    assert (start.x, start.y) == (pytest.approx(PEDESTRIAN.reach), 0.0)
+    over = Box(1000.0, 0.0, 0.0, 2100.0, 3.0)
+    with pytest.raises(NetworkError, match="no room for tester0 on the pavements"):
+        clear_starts([area], [PEDESTRIAN], starts, [over], np.random.default_rng(1))
+
+
+def test_nobody_starts_in_a_car_that_stands_in_sumo(staged: Staged, tmp_path: Path) -> None:
+    """A car is parked where testers may start here; only who would start in it is moved."""
+    plan, bare = staged()
+    lane = read_network(bare.net).edges[-1].getLanes()[-1]
+    routes = tmp_path / "parked.rou.xml"
+    routes.write_text(
+        f'<routes><route id="r" edges="{lane.getEdge().getID()}"/>'
+        f'<vehicle id="parked" route="r" depart="0" departLane="{lane.getIndex()}" departPos="50">'
+        f'<stop lane="{lane.getID()}" endPos="50.1" duration="1000"/></vehicle></routes>'
+    )
+    plan, site = staged(routes=str(routes), agents=["timing"], runs=12)
+    axis = Polyline(lane_shape(lane))
+    area = StartingArea(axis, 40.0, 58.0, 3.0, ())
+    moved = 0
+    with EpisodeRunner(plan, dataclasses.replace(site, areas=(area,))) as runner:
+        for run in range(plan.runs):
+            one = job(plan, run)
+            first = EpisodeLoop(runner.setup, runner._cast(one), one.seed, record=True)
+            (car,) = first.snapshot.background
+            rooms = [room(s, PEDESTRIAN) for s in first.scene.starts]
+            assert all(is_clear(box, [car.box]) for box in rooms)
+            for state, start in zip(first.snapshot.testers, first.scene.starts, strict=True):
+                assert (state.x, state.y, state.o) == (start.x, start.y, start.o)
+            drawn = draw_starts([area], TRIO, starts_generator(one.seed))
+            moved += drawn != first.scene.starts
+    assert 0 < moved < plan.runs
 
 
 @ALL

@@ -40,14 +40,19 @@ ROADS = Roads(
 AWAY: Pose = (-50.0, 0.0, 5.0, 0.0)  # where the ego meets nobody
 
 
-def judged(
+def judged(*moments: list[Pose], **around: Any) -> str:
+    """The first breach after these poses of the testers, one list a timestep; see ``watched``."""
+    return str(watched(*moments, **around).first or "")
+
+
+def watched(
     *moments: list[Pose],
     ego: Pose = AWAY,
     kind: Kind = PEDESTRIAN,
     traffic: list[Pose] | None = None,
     roads: Roads | None = ROADS,
-) -> str:
-    """What the umpire says after these poses of the testers, one list a timestep."""
+) -> ValidityMonitor:
+    """The umpire who saw these poses of the testers."""
     bodies = tuple(Body(f"tester{i}", kind) for i in range(len(moments[0])))
     driver = Body("ego", CAR)
     starts = tuple(Start(x, y, o) for x, y, _, o in moments[0])
@@ -61,7 +66,7 @@ def judged(
         snapshot = Snapshot(step, step * DT, BodyState(driver, *ego), 0.0, testers, others)
         contacts.observe(snapshot)
         monitor.observe(snapshot, contacts.pairs)
-    return str(monitor.first or "")
+    return monitor
 
 
 def walk(*poses: Pose, steps: int = 12) -> list[list[Pose]]:
@@ -97,6 +102,43 @@ def test_who_moves_into_whom() -> None:
     beside = (6.0, -4.0 + 0.65, 0.0, 0.0)
     assert judged(*walk(coming, beside)) == ""  # they brush past each other
     assert judged(*walk((5.0, -4.0, 1.4, 0.0), (6.4, -4.0, 1.4, math.pi)))
+
+
+def test_a_pair_is_measured_once_and_in_full() -> None:
+    """Two who walk through each other: neither got as deep as is allowed by its own way alone."""
+    met = watched(*walk((5.0, -4.0, 1.4, 0.0), (6.3, -3.83, 1.4, math.pi)))
+    assert [str(breach).split(" at ")[0] for breach in met.breaches.values()] == [
+        "tester0 moved into tester1",
+        "tester1 moved into tester0",
+    ]
+    for name in ("tester0", "tester1"):
+        assert met.spoils(Judgement("a", "violated", name)) is met.breaches[name]
+
+
+def test_no_test_is_valid_in_which_somebody_walked_through_the_tester() -> None:
+    """The one that stood did not move into anybody, and yet proves nothing any more."""
+    met = watched(*walk((6.0, -4.0, 0.0, 0.0), (5.0, -4.0, 1.4, 0.0)))
+    assert str(met.first).startswith("tester1 moved into tester0")
+    assert str(met.breaches["tester0"]).startswith("tester0 stood in the way of tester1")
+
+
+def test_the_depth_is_not_added_up() -> None:
+    """In and out again is no deeper than once; what one starts with counts."""
+    out, into = (5.0, -4.0, 0.0, 0.0), (5.2, -4.0, 0.0, 0.0)
+    standing = (5.6, -4.0, 0.0, 0.0)
+    assert depth(Box(*into[:2], 0.0, 0.65625, 0.875), Box(5.6, -4.0, 0.0, 0.65625, 0.875)) < 0.3
+    there_and_back = [[pose, standing] for pose in (out, into) * 4]
+    met = watched(*there_and_back)
+    assert not any("moved into" in str(b) for b in met.breaches.values())
+    deeper = [[(x, -4.0, 1.4, 0.0), standing] for x in (5.2, 5.27, 5.34)]
+    assert judged(*deeper).startswith("tester0 moved into tester1 at 0.1 s")
+
+
+def test_a_walking_tester_answers_for_the_whole_depth_to_traffic() -> None:
+    """Traffic comes onto one that walks too; one that stands costs nothing (the test below)."""
+    coming = [(7.0 - 1.4 * DT * i, -4.0, 1.4, math.pi) for i in range(12)]
+    slow = walk((6.0, -4.0, 0.1, 0.0))
+    assert judged(*slow, traffic=coming).startswith("tester0 moved into walker")
 
 
 def test_traffic_that_walks_into_a_tester_is_not_its_fault() -> None:

@@ -37,8 +37,9 @@ class Agent:
     An agent lives as long as a batch: ``reset`` begins an episode, what it learned stays.
 
     Attributes:
-        sees_background: whether it looks at the background traffic. Set False where it does not:
-            when nobody in an episode does, far bodies are left out of the snapshots.
+        sees_background: whether it looks at background traffic farther than ``snapshot.AROUND_M``
+            from its bodies. Set False where it does not: when nobody in an episode does, bodies
+            that are far from everybody are left out of the snapshots.
         drives: whether its bodies may be vehicles. Set False where it can only walk.
         FILES: its parameters that name files; their checksums are noted with the results.
     """

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from typing import Protocol
 
+from cavsumo.agents.avoidance import Avoidance
 from cavsumo.agents.manoeuvres import Driver
 from cavsumo.agents.triggers import Timing, Trigger
 from cavsumo.agents.walking import ApproachKerb, CrossingWalk, Stroll
@@ -71,24 +72,29 @@ def idling(name: str, scene: Scene, index: int) -> Idle:
 
 
 class Walker:
-    """Crosses the road."""
+    """Crosses the road, and keeps out of others before, meanwhile and after."""
 
     def __init__(self, scene: Scene, index: int, idle: str) -> None:
         self.scene, self.index = scene, index
         self._crossing = CrossingWalk(scene)
         self._idle = idling(idle, scene, index)
+        self._avoidance = Avoidance(scene, index)
 
     @property
     def active(self) -> bool:
         return self._crossing.crossing is not None
 
     def idle(self, snapshot: Snapshot, state: BodyState) -> Action:
-        return self._idle.action(state)
+        if self._avoidance.tired and isinstance(self._idle, Stroll):
+            self._idle.turn_back(state)
+            self._avoidance.turn_back(state)
+        return self._avoidance.along(snapshot, state, self._idle.action(state))
 
     def begin(self, state: BodyState) -> bool:
         if not self._crossing.begin(state):
             return False
         self._idle = DoNothing()  # beyond the road nothing of the start holds
+        self._avoidance.rest()
         return True
 
     def over(self, state: BodyState) -> bool:
@@ -98,7 +104,8 @@ class Walker:
         self._crossing.end()
 
     def act(self, snapshot: Snapshot, state: BodyState) -> Action:
-        return self._crossing.action(state)
+        action, heading = self._crossing.action(state), self._crossing.heading
+        return self._avoidance.across(snapshot, state, action, heading)
 
     def timing(self, aim: float) -> Trigger:
         return Timing(self.scene, self.index, aim)

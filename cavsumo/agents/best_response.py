@@ -17,6 +17,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
+from cavsumo.agents.avoidance import Avoidance
 from cavsumo.agents.base import AGENTS, Agent, learner_of
 from cavsumo.agents.planning.coordinates import Coordinates, Relative
 from cavsumo.agents.planning.opponent import (
@@ -196,10 +197,18 @@ class Pupil:
             clearance *= agent.rng.random()
             self.explores = Timing(agent.scene, index, agent.rng.uniform(*EXPLORED_AIMS))
         self.waiting = ApproachKerb(agent.scene, index, clearance)
+        self.avoidance = Avoidance(agent.scene, index)
         self.begun, self.last = False, STAND
 
     def action(self, snapshot: Snapshot, state: BodyState) -> Action:
-        """The next action."""
+        """The next action, out of the way of others."""
+        wanted = self._wanted(snapshot, state)
+        if self.crossing.active and self.last == WALK:
+            return self.avoidance.across(snapshot, state, wanted, self.crossing.heading)
+        return self.avoidance.along(snapshot, state, wanted)
+
+    def _wanted(self, snapshot: Snapshot, state: BodyState) -> Action:
+        """The next action if nobody is in the way."""
         if self.begun and not self.crossing.active:
             return NOOP  # it has arrived on the other side
         move = self.last = self._move(snapshot, state)

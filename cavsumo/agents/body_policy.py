@@ -49,6 +49,12 @@ class BodyPolicy:
         self.going = escape is not None
         self._passed = -scene.ego.kind.length - scene.bodies[index].kind.width - PASSED_M
 
+    @property
+    def heading(self) -> float:
+        """The heading of the way on which it goes [rad]."""
+        way = self.scene.way(self.index)
+        return (way.heading if way else self.scene.starts[self.index].o) + (self.escape or 0.0)
+
     def sure(self, snapshot: Snapshot) -> bool:
         """Whether the goal is sure from here, against the class of egos or one fallen back on."""
         here = self.where(snapshot)

@@ -11,6 +11,7 @@ from typing import ClassVar
 
 import numpy as np
 
+from cavsumo.agents.avoidance import Avoidance
 from cavsumo.agents.base import AGENTS, NOT_FORCEABLE, SURE, UNDECIDED, Agent, Forecast
 from cavsumo.agents.body_policy import BodyPolicy
 from cavsumo.agents.lookahead import succeeds
@@ -74,6 +75,7 @@ class ExpectiminimaxAgent(Agent):
         super().reset(scene, owned, rng)
         self._forceabilities = {i: self._forceabilities_of(i) for i in owned}
         self.policies = [BodyPolicy(scene, i, self._forceabilities[i]) for i in owned]
+        self.avoidances = [Avoidance(scene, i) for i in owned]
         self.team = self.policies
         self.leader: BodyPolicy | None = None
 
@@ -91,12 +93,19 @@ class ExpectiminimaxAgent(Agent):
         return Forecast(NOT_FORCEABLE, best)
 
     def choose_action(self, snapshot: Snapshot) -> tuple[Action, ...]:
-        chosen = [None if t.going else t.idle(snapshot) for t in self.policies]
+        states = self.own(snapshot)
+        bodies = list(zip(self.policies, self.avoidances, states, strict=True))
+        chosen = [
+            None if t.going else avoidance.along(snapshot, state, t.idle(snapshot))
+            for t, avoidance, state in bodies
+        ]
         if snapshot.sees_ego:
             self._send(snapshot, chosen)
         return tuple(
-            t.go(snapshot) if t.going or idle is None else idle
-            for t, idle in zip(self.policies, chosen, strict=True)
+            idle
+            if idle is not None and not t.going
+            else avoidance.across(snapshot, state, t.go(snapshot), t.heading)
+            for (t, avoidance, state), idle in zip(bodies, chosen, strict=True)
         )
 
     @classmethod

@@ -21,6 +21,7 @@ import numpy as np
 
 from cavsumo.agents.base import AGENTS, Agent, learner_of
 from cavsumo.agents.features import FEATURES, TARGETS, Features, towards
+from cavsumo.agents.staying import Staying
 from cavsumo.model.bodies import Action
 from cavsumo.model.checks import number, truth
 from cavsumo.model.scene import Scene
@@ -83,6 +84,7 @@ class QLearningAgent(Agent):
         self._steps = max(1, round(self.hold_s / scene.dt))
         self._discount = self.gamma**scene.dt
         self.features = [Features(scene, i) for i in owned]
+        self._staying = [Staying(scene, i) for i in owned]
         self._decided: list[tuple[int, list[float]]] = []
         self._held, self._return = 0, 0.0
 
@@ -90,9 +92,9 @@ class QLearningAgent(Agent):
         if not self._decided:
             self._decided = [self._decide(i, snapshot) for i in range(len(self.owned))]
         return tuple(
-            towards(state, features.across, target, self.scene.dt)
-            for state, features, (target, _) in zip(
-                self.own(snapshot), self.features, self._decided, strict=True
+            staying.action(state, towards(state, features.across, target, self.scene.dt))
+            for staying, state, features, (target, _) in zip(
+                self._staying, self.own(snapshot), self.features, self._decided, strict=True
             )
         )
 

@@ -9,6 +9,7 @@ from typing import ClassVar
 import numpy as np
 
 from cavsumo.agents.base import AGENTS, Agent
+from cavsumo.agents.staying import Staying
 from cavsumo.model.bodies import NOOP, Action, Kind
 from cavsumo.model.checks import choice, number
 from cavsumo.model.scene import Scene
@@ -54,14 +55,17 @@ class RandomAgent(Agent):
         super().reset(scene, owned, rng)
         self._epsilon = self.exploration.per_step(scene.dt)
         self._last = [NOOP for _ in owned]
+        self._staying = [Staying(scene, i) for i in owned]
 
     def choose_action(self, snapshot: Snapshot) -> tuple[Action, ...]:
-        for i, state in enumerate(self.own(snapshot)):
+        states = self.own(snapshot)
+        for i, state in enumerate(states):
             if self.rng.random() < self._epsilon:
                 self._last[i] = random_action(state.body.kind, self.rng)
             elif self.between == "noop":
                 self._last[i] = NOOP
-        return tuple(self._last)
+        drawn = zip(self._staying, states, self._last, strict=True)
+        return tuple(staying.action(state, action) for staying, state, action in drawn)
 
 
 def random_action(kind: Kind, rng: np.random.Generator) -> Action:

@@ -85,6 +85,7 @@ class CrossingWalk:
         self.crossing: Crossing | None = None
         self.turning_back = False
         self.prior = 0.0
+        self.heading = 0.0  # the one that it takes
 
     @property
     def active(self) -> bool:
@@ -112,8 +113,8 @@ class CrossingWalk:
         """The next action while active; ends the behaviour when it has arrived."""
         assert self.crossing is not None
         over, self.turning_back = self.over(state), self._across(state)
-        heading = self.prior if self.turning_back else self.crossing.heading
-        action = walk(state, heading, state.body.kind.v_max, self.scene.dt)
+        self.heading = self.prior if self.turning_back else self.crossing.heading
+        action = walk(state, self.heading, state.body.kind.v_max, self.scene.dt)
         if over:
             self.end()
         return action
@@ -131,7 +132,13 @@ class Stroll:
 
     def __init__(self, scene: Scene, index: int) -> None:
         self.dt, self.start = scene.dt, scene.starts[index]
+        self.forwards, self.lateral = self.start.forwards, self.start.lateral
         self.segment: int | None = None
+
+    def turn_back(self, state: BodyState) -> None:
+        """Walk the other way from now on, on a line so far to the inner side as the turn takes."""
+        self.forwards = not self.forwards
+        self.lateral -= math.copysign(2.0 * turn_radius(state.body.kind), self.lateral)
 
     def action(self, state: BodyState) -> Action:
         """The next action; straight on for a body that started away from any pavement."""
@@ -141,9 +148,9 @@ class Stroll:
         here = start.pavement.project(state.x, state.y, self.segment)
         self.segment = here.segment
         _, _, axis = start.pavement.at(here.along)
-        left = here.along if not start.forwards else start.pavement.length - here.along
-        correction = max(-0.5, min(0.5, PAVEMENT_GAIN * (start.lateral - here.lateral)))
-        heading = axis + correction if start.forwards else axis + math.pi - correction
+        left = here.along if not self.forwards else start.pavement.length - here.along
+        correction = max(-0.5, min(0.5, PAVEMENT_GAIN * (self.lateral - here.lateral)))
+        heading = axis + correction if self.forwards else axis + math.pi - correction
         allowed = stopping_speed(kind, left - state.v * self.dt, self.dt)
         return walk(state, heading, allowed, self.dt)
 

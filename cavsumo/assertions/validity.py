@@ -5,8 +5,10 @@ start. Where nothing was tested nothing can be invalid: such an episode stays in
 agents would be rewarded for wasting it. What a body must not do before the verdict:
 
 * start in another body;
-* get into another body by its own movement, deeper than people and vehicles can: a body that
-  stands gets into nobody, so background traffic that does not see a tester costs it nothing;
+* get into another body deeper than people and vehicles can. The depth of a pair is measured once,
+  in full, and grows while a tester of the pair moves. Of two testers both answer for it, or bodies
+  would pass through each other in a valid test; a tester that stands gets into nobody else, so
+  background traffic that does not see it costs it nothing;
 * get into the standing ego and still be there when that drives on;
 * leave the world: on foot farther than STRAY_M from carriageways and pavements, vehicles farther
   than OFF_ROAD_M from the carriageway, unless at the end of its way out of the network;
@@ -60,7 +62,8 @@ class ValidityMonitor:
         self._scene = scene
         self._index = {body.id: i for i, body in enumerate(scene.bodies)}
         self._testers: tuple[BodyState, ...] = ()
-        self._depths: dict[tuple[str, str], float] = {}  # how deep who got into whom by itself [m]
+        # Of each pair that touches: what counts of its depth, and all of it [m].
+        self._depths: dict[tuple[str, str], tuple[float, float]] = {}
         # Where each was last looked for on the map, and how far from there it cannot have left.
         self._known = [(math.inf, math.inf, 0.0)] * len(scene.bodies)
 
@@ -97,26 +100,38 @@ class ValidityMonitor:
         """Whether a tester starts in another body; touching the ego is enough."""
         for a, b in pairs:
             tester, other = (a, b) if a.id in self._index else (b, a)
-            with_ego = other is snapshot.ego
-            if tester.id in self._index and (with_ego or _depth(tester, other) > _allowed(a, b)):
+            with_ego, deep = other is snapshot.ego, _depth(tester, other)
+            self._depths[a.id, b.id] = deep, deep
+            if tester.id in self._index and (with_ego or deep > _allowed(a, b)):
                 self._report(snapshot, tester.id, f"{STARTS_IN} {other.id}")
 
     def _look_at_pairs(self, snapshot: Snapshot, pairs: Sequence[Pair]) -> None:
-        """Add up how deep each tester gets into others by its own movement."""
+        """Measure how deep pairs are in each other, once each, and report who is too deep."""
         before, self._depths = self._depths, {}
         standing = snapshot.ego.v <= STANDING_MPS
         for a, b in pairs:
-            for one, other in ((a, b), (b, a)):
-                i = self._index.get(one.id)
-                if i is None:
-                    continue
-                key = one.id, other.id
-                deep = before.get(key, 0.0)
-                if other is not snapshot.ego or standing:
-                    deep += max(0.0, _depth(one, other) - _depth(self._testers[i], other))
-                self._depths[key] = deep
-                if deep > _allowed(one, other) and not (other is snapshot.ego and standing):
-                    self._report(snapshot, one.id, f"moved into {other.id}")
+            with_ego, deep = a is snapshot.ego, _depth(a, b)
+            counted, was = before.get((a.id, b.id), (0.0, 0.0))
+            movers = [s for s in (a, b) if self._moved(s)]
+            if movers and (standing or not with_ego):
+                counted += max(0.0, deep - was)
+            counted = min(counted, deep)
+            self._depths[a.id, b.id] = counted, deep
+            if counted > _allowed(a, b) and not (with_ego and standing):
+                self._report_pair(snapshot, a, b)
+
+    def _moved(self, state: BodyState) -> bool:
+        """Whether it is a tester that is not where it was."""
+        i = self._index.get(state.id)
+        return i is not None and state[1:] != self._testers[i][1:]
+
+    def _report_pair(self, snapshot: Snapshot, a: BodyState, b: BodyState) -> None:
+        """The testers of a pair that is too deep in each other, those that moved first."""
+        testers = [(one, other) for one, other in ((a, b), (b, a)) if one.id in self._index]
+        for one, other in sorted(testers, key=lambda pair: not self._moved(pair[0])):
+            stood = len(testers) > 1 and not self._moved(one)
+            what = f"stood in the way of {other.id}" if stood else f"moved into {other.id}"
+            self._report(snapshot, one.id, what)
 
     def _look_at_moves(self, snapshot: Snapshot) -> None:
         """Whether a tester left the world or moved as it cannot."""

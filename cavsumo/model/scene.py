@@ -6,6 +6,8 @@ import math
 from dataclasses import dataclass, field
 from typing import Any
 
+import shapely
+
 from cavsumo.model.bodies import Body
 from cavsumo.model.carriageway import Crossing, Light, Limit, MarkedCrossing, Roads, Start
 from cavsumo.model.polyline import Path, Projection
@@ -26,6 +28,7 @@ class Scene:
         lights: the traffic lights on the ego's path, in the order in which it meets them.
         crossings: the marked pedestrian crossings on the ego's path, likewise.
         limits: the speed limits on the ego's path, likewise.
+        ground: all that one can walk or drive on near the ego's path; None where it is not told.
         horizon: how long the episode may last [s]; infinite where nobody said.
         seed: of the episode; whoever draws random numbers without a generator starts from it.
     """
@@ -41,6 +44,7 @@ class Scene:
     crossings: tuple[MarkedCrossing, ...] = ()
     limits: tuple[Limit, ...] = ()
     horizon: float = math.inf
+    ground: shapely.Geometry | None = field(default=None, repr=False)
     _progress: list[Any] = field(default_factory=lambda: [None, None], repr=False)
     _glimpse: list[Any] = field(default_factory=lambda: [None, None], repr=False)
     _ways: dict[int, Crossing | None] = field(default_factory=dict, repr=False)

@@ -11,6 +11,8 @@ from typing import NamedTuple
 from cavsumo.model.bodies import Body
 from cavsumo.model.geometry import Box
 
+AROUND_M = 2.5  # the background so near the ego or a tester, box to box, is in every snapshot
+
 
 class BodyState(NamedTuple):
     """A body and its state (seed, appendix): position of the box's centre, speed, orientation."""
@@ -48,7 +50,7 @@ class Snapshot(NamedTuple):
         testers: the tester's bodies, in the order of the scenario.
         raw_background: everybody else, as plain tuples in the field order of BodyState. When no
             ego, agent or assertion of the episode ``sees_background`` and nothing is recorded,
-            those are left out who cannot touch the ego or a tester now (see ``background``).
+            those are left out who are not within AROUND_M of the ego or a tester (``background``).
         lights: what each of ``Scene.lights`` shows the ego, as SUMO's letter (G and g are green, y
             is yellow, r is red).
         unseen: ids of the ego and of testers whom a tester agent does not see through its sensor

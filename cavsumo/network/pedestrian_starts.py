@@ -1,9 +1,12 @@
-"""Where tester pedestrians start: on the pavements beside the ego's path, seeded."""
+"""Where tester pedestrians start: on the pavements beside the ego's path, seeded.
+
+Nobody starts in another body, or so near that it could not stop before it.
+"""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -14,13 +17,16 @@ from shapely.geometry import LineString
 from cavsumo.errors import NetworkError
 from cavsumo.model.bodies import Kind
 from cavsumo.model.carriageway import Roads, Start
+from cavsumo.model.geometry import Box
 from cavsumo.model.polyline import Path
+from cavsumo.model.stopping_way import is_clear, stopping_way, stretched
 from cavsumo.network.reader import Network, lane_shape, pavement_walk
 
 NEAR_M = 20.0  # pavements farther than this from the ego's path are left out
 PIECE_M = 1.0  # resolution at which a pavement is judged
 APART_M = 1.2  # two testers do not start closer together than this
 ATTEMPTS = 50
+STOPPING_S = 0.2  # the room ahead of a start is counted with timesteps of this length
 
 # The ways across the road from the pieces of pavements, by the ids of their lanes.
 WaysAcross = dict[str, "np.ndarray[Any, Any]"]
@@ -76,18 +82,83 @@ def draw_starts(
 ) -> tuple[Start, ...]:
     """One start for each body, uniform over the areas, apart from each other, facing along.
 
+    Two bodies have room to stop before each other, unless only starts without it are left.
     Consumes the generator. Raises NetworkError when the bodies do not fit.
     """
     starts: list[Start] = []
     for kind in kinds:
-        for _ in range(ATTEMPTS):
-            start = _draw(areas, kind, rng)
-            if all(math.dist((start.x, start.y), (s.x, s.y)) > APART_M for s in starts):
-                starts.append(start)
-                break
-        else:
+        rooms = [room(s, k) for s, k in zip(starts, kinds, strict=False)]
+        drawn = list(_draws(areas, kind, rng, starts, rooms))
+        if not drawn:
             raise NetworkError(f"no room for {len(kinds)} testers on the pavements: use fewer")
+        starts.append(drawn[-1])
     return tuple(starts)
+
+
+def clear_starts(
+    areas: Sequence[StartingArea],
+    kinds: Sequence[Kind],
+    starts: Sequence[Start],
+    taken: Sequence[Box],
+    rng: np.random.Generator,
+) -> tuple[Start, ...]:
+    """The same starts, but those that are not clear of the boxes of others drawn again.
+
+    Where no draw helps the start is moved along the pavements. Consumes the generator if a start
+    has to be drawn. Raises NetworkError when there is no room.
+    """
+    found = list(starts)
+    for i, kind in enumerate(kinds):
+        if not found[i].pavement or is_clear(room(found[i], kind), taken):
+            continue
+        apart = [*found[:i], *found[i + 1 :]]
+        rooms = [room(s, k) for s, k in zip(apart, (*kinds[:i], *kinds[i + 1 :]), strict=True)]
+        rooms += taken
+        tried = (*_draws(areas, kind, rng, apart, rooms), *_along(areas, kind))
+        clear = (s for s in tried if _apart(s, apart) and is_clear(room(s, kind), rooms))
+        start = next(clear, None)
+        if start is None:
+            raise NetworkError(
+                f"no room for tester{i} on the pavements: others stand wherever it could start"
+            )
+        found[i] = start
+    return tuple(found)
+
+
+def room(start: Start, kind: Kind) -> Box:
+    """The box of a body at its start and the way that it needs to stop, at its highest speed."""
+    box = Box(start.x, start.y, start.o, kind.length, kind.width)
+    return stretched(box, stopping_way(kind, kind.v_max, STOPPING_S))
+
+
+def _draws(
+    areas: Sequence[StartingArea],
+    kind: Kind,
+    rng: np.random.Generator,
+    starts: Sequence[Start],
+    rooms: Sequence[Box],
+) -> Iterator[Start]:
+    """Starts apart from others, until one has its room clear, or enough were drawn."""
+    for _ in range(ATTEMPTS):
+        start = _draw(areas, kind, rng)
+        if _apart(start, starts):
+            yield start
+            if is_clear(room(start, kind), rooms):
+                return
+
+
+def _along(areas: Sequence[StartingArea], kind: Kind) -> Iterator[Start]:
+    """Starts on the axes of all areas, one after another, facing along and against."""
+    for area in areas:
+        low, high = _range(area, kind)
+        for i in range(1 + max(0, int((high - low) / PIECE_M))):
+            for forwards in (True, False):
+                yield _start(area, low + i * PIECE_M, 0.0, forwards)
+
+
+def _apart(start: Start, others: Iterable[Start]) -> bool:
+    """Whether a start is far enough from others."""
+    return all(math.dist((start.x, start.y), (s.x, s.y)) > APART_M for s in others)
 
 
 def _stretches(
@@ -140,11 +211,23 @@ def _draw(areas: Sequence[StartingArea], kind: Kind, rng: np.random.Generator) -
     margin = math.hypot(kind.length, kind.width) / 2
     weights = np.array([(a.end - a.begin) * a.width for a in areas])
     area = areas[int(rng.choice(len(areas), p=weights / weights.sum()))]
+    low, high = _range(area, kind)
+    along = float(rng.uniform(low, high)) if low < high else low
+    aside = max(0.0, area.width / 2 - margin)
+    lateral = float(rng.uniform(-aside, aside))
+    return _start(area, along, lateral, bool(rng.integers(2)))
+
+
+def _range(area: StartingArea, kind: Kind) -> tuple[float, float]:
+    """Between which arc lengths of its axis a body may start on an area [m]."""
+    margin = math.hypot(kind.length, kind.width) / 2
     low, high = max(area.begin, margin), min(area.end, area.pavement.length - margin)
-    along = float(rng.uniform(low, high)) if low < high else (area.begin + area.end) / 2
-    room = max(0.0, area.width / 2 - margin)
-    lateral = float(rng.uniform(-room, room))
-    forwards = bool(rng.integers(2))
+    middle = (area.begin + area.end) / 2
+    return (low, high) if low < high else (middle, middle)
+
+
+def _start(area: StartingArea, along: float, lateral: float, forwards: bool) -> Start:
+    """A start at an arc length and offset of an area's pavement."""
     x, y, o = area.pavement.at(along)
     x, y = x - lateral * math.sin(o), y + lateral * math.cos(o)
     if not forwards:

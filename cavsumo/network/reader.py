@@ -17,7 +17,7 @@ from xml.etree import ElementTree
 
 import shapely
 import sumolib
-from shapely.geometry import LineString
+from shapely.geometry import LineString, Polygon
 
 from cavsumo.errors import NetworkError, UnknownName
 from cavsumo.model.carriageway import Roads
@@ -102,6 +102,26 @@ class Network:
             self._pavements = lanes, shapely.STRtree([LineString(lane_shape(p)) for p in lanes])
         lanes, tree = self._pavements
         return [lanes[i] for i in sorted(tree.query(line, "dwithin", reach_m).tolist())]
+
+    def ground(self, line: LineString, reach_m: float) -> shapely.Geometry:
+        """All lanes, crossings and walking areas, as one surface, within a distance of a line [m].
+
+        Lanes without a surface are left out: nobody can walk on them.
+        """
+        insides = [e for kind in ("internal", "crossing") for e in self.inside(kind)]
+        lanes = [
+            lane
+            for edge in (*self.edges, *insides)
+            for lane in edge.getLanes()
+            if len(lane.getShape()) > 1 and float(lane.getWidth()) > 0.0
+        ]
+        axes = [LineString(lane_shape(lane)) for lane in lanes]
+        near = shapely.dwithin(axes, line, reach_m).tolist()
+        outlines = [edge.getLanes()[0].getShape() for edge in self.inside("walkingarea")]
+        areas = [Polygon([p[:2] for p in points]) for points in outlines if len(points) > 2]
+        surfaces = lane_areas([lane for lane, it_is in zip(lanes, near, strict=True) if it_is])
+        surfaces += [area for area in areas if shapely.dwithin(area, line, reach_m)]
+        return shapely.union_all(shapely.make_valid(surfaces))  # outlines may cut themselves
 
     def roads(self) -> Roads:
         """The carriageways, junctions included, and the axes of driving lanes and pavements."""

@@ -13,12 +13,14 @@ from typing import TypeVar
 
 import numpy as np
 import shapely
+from shapely.geometry import LineString
 
 from cavsumo.errors import NetworkError
 from cavsumo.model.bodies import PEDESTRIAN, WALKING, Body, Kind
 from cavsumo.model.carriageway import Approach, Light, Limit, MarkedCrossing, Roads, Start
 from cavsumo.model.geometry import Box
 from cavsumo.model.scene import Scene
+from cavsumo.model.stopping_way import is_clear
 from cavsumo.network.approaches import approaches
 from cavsumo.network.ego_routes import (
     EgoRoute,
@@ -28,13 +30,20 @@ from cavsumo.network.ego_routes import (
     turning_routes,
 )
 from cavsumo.network.jaywalk_starts import kerb_areas
-from cavsumo.network.pedestrian_starts import StartingArea, draw_starts, starting_areas
+from cavsumo.network.pedestrian_starts import (
+    StartingArea,
+    clear_starts,
+    draw_starts,
+    room,
+    starting_areas,
+)
 from cavsumo.network.reader import Network, read_network
 from cavsumo.network.route_rules import crossings_along, limits_along
 from cavsumo.network.traffic import Volume, background
 from cavsumo.network.traffic_lights import LightStart, Pace, Signal, light_start, lights_along
 from cavsumo.network.vehicle_starts import draw_vehicles
 
+GROUND_M = 100.0  # the ground is told so far from the ego's path
 ATTEMPTS = 50  # routes that are tried before a network is refused
 Where = TypeVar("Where")  # from where testers meet the ego: areas or approaches
 
@@ -55,6 +64,7 @@ class Site:
         lights: the traffic lights on the ego's route.
         marked: the marked pedestrian crossings on the ego's route.
         limits: the speed limits on the ego's route.
+        ground: all that one can walk or drive on near the route, where testers on foot keep to it.
     """
 
     net: Path
@@ -68,6 +78,7 @@ class Site:
     lights: tuple[Light, ...] = ()
     marked: tuple[MarkedCrossing, ...] = ()
     limits: tuple[Limit, ...] = ()
+    ground: shapely.Geometry | None = None
 
     def draw(
         self, kinds: Sequence[Kind], ego: Kind, start_speed: float | None, rng: np.random.Generator
@@ -77,6 +88,24 @@ class Site:
             return draw_starts(self.areas, kinds, rng)
         box = Box(*self.route.path.at(0.0), ego.length, ego.width)
         return draw_vehicles(self.approaches, kinds, box, start_speed, rng)
+
+    def blocked(self, kinds: Sequence[Kind], starts: Sequence[Start], taken: Sequence[Box]) -> bool:
+        """Whether somebody is where a tester on a pavement starts, or right before it."""
+        drawn = [(s, kind) for s, kind in zip(starts, kinds, strict=True) if s.pavement]
+        return not all(is_clear(room(start, kind), taken) for start, kind in drawn)
+
+    def cleared(
+        self,
+        kinds: Sequence[Kind],
+        starts: Sequence[Start],
+        taken: Sequence[Box],
+        rng: np.random.Generator,
+    ) -> tuple[Start, ...]:
+        """The starts of testers on foot with those that are blocked drawn again.
+
+        Consumes the generator. Raises NetworkError when there is no room.
+        """
+        return clear_starts(self.areas, kinds, starts, taken, rng)
 
     def scene(
         self, dt: float, ego: Body, bodies: Sequence[Body], starts: Sequence[Start], seed: int
@@ -93,6 +122,7 @@ class Site:
             seed=seed,
             crossings=self.marked,
             limits=self.limits,
+            ground=self.ground,
         )
 
 
@@ -155,6 +185,7 @@ def _derived(
     def by_road(route: EgoRoute) -> tuple[Approach, ...]:
         return approaches(network, route, ego, wishes.kind, wishes.types)
 
+    walks_on_pavements = wishes.kind.name in WALKING and not wishes.jaywalk
     if wishes.kind.name in WALKING:
         route, areas = _route(network, ego_route, junction, ego.length / 2, on_foot)
     else:
@@ -171,6 +202,7 @@ def _derived(
         lights_along(network, route),
         crossings_along(network, route),
         limits_along(network, route),
+        network.ground(LineString(route.path.points), GROUND_M) if walks_on_pavements else None,
     )
 
 

@@ -233,18 +233,18 @@ def _reset(
     kinds = [body.kind for body in setup.bodies]
     ego = setup.world.ego_body
     starts = setup.site.draw(kinds, ego.kind, setup.start_speed, placing)
-    site = setup.site
-    scene = site.scene(setup.world.dt, ego, setup.bodies, starts, seed)
-    scene = dataclasses.replace(scene, horizon=setup.horizon)
     watching: list[Ego | Agent | Assertion] = [setup.ego, *agents, *setup.assertions]
     # Vehicles keep their distance to whoever is ahead of them, so they see everybody.
     driving = any(start.approach for start in starts)
-    senses = _senses(setup, scene, streams)
-    everything = record or driving or senses is not None
+    everything = record or driving or bool(setup.ego_sensor or setup.tester_sensor)
     everything = everything or any(who.sees_background for who in watching)
     snapshot = setup.world.reset(
         seed, _states(setup, starts), starts, everything=everything, simulation=simulation
     )
+    starts, snapshot = _cleared(setup, starts, snapshot, placing)
+    scene = setup.site.scene(setup.world.dt, ego, setup.bodies, starts, seed)
+    scene = dataclasses.replace(scene, horizon=setup.horizon)
+    senses = _senses(setup, scene, streams)
     for agent, team, rng in zip(agents, setup.teams, rest, strict=True):
         agent.reset(scene, team, rng)
     type(agents[0]).coordinate(agents, electing)
@@ -252,6 +252,22 @@ def _reset(
     for assertion in setup.assertions:
         assertion.reset(scene)
     return scene, snapshot, senses
+
+
+def _cleared(
+    setup: Setup, starts: tuple[Start, ...], snapshot: Snapshot, rng: np.random.Generator
+) -> tuple[tuple[Start, ...], Snapshot]:
+    """Starts and first snapshot without testers on foot where others are as the ego enters.
+
+    Traffic is there before the testers are drawn, and where it stands depends on the episode.
+    """
+    kinds = [body.kind for body in setup.bodies]
+    near = [snapshot.ego.box, *(other.box for other in snapshot.background)]
+    if not setup.site.blocked(kinds, starts, near):
+        return starts, snapshot
+    taken = [snapshot.ego.box, *(BodyState(*raw).box for raw in setup.world.everybody())]
+    starts = setup.site.cleared(kinds, starts, taken, rng)
+    return starts, setup.world.shift(tuple(_states(setup, starts)))
 
 
 def _foretold(agents: Sequence[Agent], views: Sequence[Snapshot]) -> Forecast | None:

@@ -16,9 +16,11 @@ over all watchers, less f. From then on
 * no watcher moves by more than the way that was *measured* in that timestep, the longest of all.
 
 So as long as the sum over the timesteps of stride and measured way stays below g, the boxes are
-apart, whatever turns are taken. That sum is a lookout's odometer. Bodies for which the bound does
-not hold are read in every timestep: those with stops or rides ahead (they park, board, jump), and
-persons where the network has no walking areas (they jump over junctions). Should a body ever be
+apart, whatever turns are taken. That sum is a lookout's odometer. Who walks must see others before
+it touches them, so whoever may be within AROUND_M of a watcher is read too: g is less by that.
+Bodies for which the bound does not hold are read in every timestep: those with stops or rides ahead
+(they park, board, jump), and persons where the network has no walking areas (they jump over
+junctions). Should a body ever be
 found farther from its last place than the bound allows, a SimulationError says so.
 """
 
@@ -32,7 +34,7 @@ from typing import Any, NamedTuple
 
 from cavsumo.errors import SimulationError
 from cavsumo.model.bodies import Body, Kind
-from cavsumo.model.snapshot import BodyState, RawState
+from cavsumo.model.snapshot import AROUND_M, BodyState, RawState
 from cavsumo.sumo.poses import RADIANS
 
 ROUNDING_M = 1e-6  # added to every stride; far above the rounding of any coordinate
@@ -209,7 +211,7 @@ class Lookout:
             distance = math.hypot(x - there_x, y - there_y) - body.kind.reach
             if distance < gap:
                 gap = distance
-        gap -= other.forward
+        gap -= other.forward + AROUND_M
         if other.tame:
             self._check(other, x, y)
             other.x, other.y, other.step = x, y, self._step

@@ -26,7 +26,7 @@ from cavsumo.model.carriageway import Start
 from cavsumo.model.geometry import Box, gap
 from cavsumo.model.kinematics import steering_for_turn, step_floats, wrap
 from cavsumo.model.scenario import Scenario, Simulation
-from cavsumo.model.snapshot import BodyState, Snapshot
+from cavsumo.model.snapshot import BodyState, RawState, Snapshot
 from cavsumo.network.site import Site
 from cavsumo.sumo.background import Background, Roaming, roaming
 from cavsumo.sumo.connection import Simulations
@@ -122,9 +122,19 @@ class World:
             self._insert(states, starts)
             ego = self._enter(states)
             self._make_room(states, starts)
-        self._ego = ego
+        self._ego, self._states = ego, tuple(states)
         self._background = self._lookout(everything, (ego, *states))
         return self._snapshot(ego, tuple(states))
+
+    def everybody(self) -> tuple[RawState, ...]:
+        """All bodies but the ego and the testers, wherever they are."""
+        watchers = (self._ego, *self._states)
+        background = Background(libsumo.vehicle, libsumo.person, None, self.dt, watchers)
+        return background.read(self._vehicles, libsumo.person.getIDList(), watchers)
+
+    def shift(self, states: tuple[BodyState, ...]) -> Snapshot:
+        """The first snapshot once more, with the testers elsewhere; before any timestep."""
+        return self._snapshot(self._ego, states)
 
     def step(self, states: tuple[BodyState, ...], command: Command) -> Snapshot | None:
         """Advance one timestep; None when the ego has left the network.

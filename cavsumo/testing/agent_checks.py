@@ -13,7 +13,7 @@ from cavsumo.agents.base import Agent
 from cavsumo.egos.base import EGO_KIND
 from cavsumo.model.bodies import Action
 from cavsumo.model.scene import Scene
-from cavsumo.model.snapshot import BodyState, Snapshot
+from cavsumo.model.snapshot import AROUND_M, BodyState, RawState, Snapshot
 from cavsumo.testing.scripts import CROWDED, EMPTY, ODD, Script, ScriptNetwork, driven
 
 MakeAgent = Callable[[], Agent]
@@ -23,10 +23,13 @@ EGO_SPEED = 7.0  # m/s
 Joint = tuple[Action, ...]
 
 
-def choices(agent: Agent, ground: ScriptNetwork, script: Script, seed: int = 1) -> list[Joint]:
+def choices(
+    agent: Agent, ground: ScriptNetwork, script: Script, seed: int = 1, *, apart: bool = False
+) -> list[Joint]:
     """What an agent with two of four bodies does in a script, each action checked.
 
-    The ego drives past at constant speed; bodies of others stand.
+    The ego drives past at constant speed; bodies of others stand. ``apart``: nobody of the
+    background is shown that is near a tester.
     """
     scene = ground.scene(EGO_KIND, seed, TESTERS)
     agent.reset(scene, OWNED, np.random.default_rng(seed))
@@ -36,13 +39,13 @@ def choices(agent: Agent, ground: ScriptNetwork, script: Script, seed: int = 1) 
         for body, start in zip(scene.bodies, scene.starts, strict=True)
     )
     found: list[Joint] = []
-    snapshot = _snapshot(scene, script, states, 0)
+    snapshot = _snapshot(scene, script, states, 0, apart)
     for step in range(script.steps):
         joint = tuple(agent.choose_action(snapshot))
         check_actions(joint, states, f"at {snapshot.time:g} s")
         found.append(joint)
         states = _moved(states, joint, scene.dt)
-        successor = _snapshot(scene, script, states, step + 1)
+        successor = _snapshot(scene, script, states, step + 1, apart)
         agent.process_feedback(snapshot, joint, -0.1, successor, step + 1 == script.steps)
         snapshot = successor
     return found
@@ -114,10 +117,10 @@ def check_memory(make: MakeAgent, ground: ScriptNetwork) -> str:
 
 
 def check_sees_what_it_says(make: MakeAgent, ground: ScriptNetwork) -> str:
-    """An agent that says it does not look at the background does not."""
+    """An agent that says it does not look at the background sees at most who is beside it."""
     if make().sees_background:
         return "looks at the background"
-    seen = choices(make(), ground, CROWDED)
+    seen = choices(make(), ground, CROWDED, apart=True)
     assert seen == choices(make(), ground, EMPTY), "the background changed what it did"
     return "the background changes nothing"
 
@@ -137,13 +140,27 @@ CHECKS: Mapping[str, Check] = {
 }
 
 
-def _snapshot(scene: Scene, script: Script, states: tuple[BodyState, ...], step: int) -> Snapshot:
+def _snapshot(
+    scene: Scene, script: Script, states: tuple[BodyState, ...], step: int, apart: bool
+) -> Snapshot:
     """What is seen at a timestep."""
     along = min(EGO_SPEED * step * scene.dt, scene.ego_path.length)
     x, y, o = scene.ego_path.at(along)
     ego = BodyState(scene.ego, x, y, EGO_SPEED, o)
     time = round(step * scene.dt, 6)
-    return Snapshot(step, time, ego, 0.0, states, script.others(scene, step))
+    others = script.others(scene, step)
+    if apart:
+        others = tuple([other for other in others if _is_apart(other, states)])
+    return Snapshot(step, time, ego, 0.0, states, others)
+
+
+def _is_apart(other: RawState, states: Sequence[BodyState]) -> bool:
+    """Whether a body is farther from all testers than those that are always shown."""
+    return all(
+        math.hypot(other[1] - state.x, other[2] - state.y)
+        > other[0].kind.reach + state.body.kind.reach + AROUND_M
+        for state in states
+    )
 
 
 def _moved(states: tuple[BodyState, ...], joint: Joint, dt: float) -> tuple[BodyState, ...]:

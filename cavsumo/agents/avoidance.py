@@ -1,0 +1,184 @@
+"""How a body that walks keeps out of other bodies: it stops before them, waits, and goes round.
+
+A body takes an action only if it could still stop afterwards before everybody ahead of it; else it
+brakes. That is looked up on boxes: the room that it passes over while it stops, against where the
+others are and where their speed brings them meanwhile. Of two testers the later one in the order of
+the scenario yields: the other one counts on it to stop. Nobody waits for ever: after a while a
+body that crosses a road goes round whoever stands in its way, and one that walks along a pavement
+turns back (``agents.behaviours``).
+
+The moving ego is avoided by nobody: that it must avoid the testers is the test.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+
+from cavsumo.agents.walking import walk
+from cavsumo.model.bodies import Action
+from cavsumo.model.geometry import Box, gap, overlap
+from cavsumo.model.kinematics import step_floats, wrap
+from cavsumo.model.scene import Scene
+from cavsumo.model.snapshot import AROUND_M, BodyState, Snapshot
+from cavsumo.model.stopping_way import stopping_way, stretched
+
+KEEP_M = 0.65  # room kept to who is ahead: enough to turn back in
+START_M = 0.3  # so much more of it lets one who stands go on, or it would creep up
+# Boxes are larger than people: so much of a side may brush another's [m] (``validity.DEEP_M``).
+BRUSH_TESTER_M, BRUSH_M = 0.15, 0.05
+DEEPEST = 1.8  # who turns while somebody is in it gets no deeper than so many times that
+PATIENCE_S, YIELDING_S = 4.0, 2.0  # how long one waits, and for a tester that goes first
+ROUND_S = 12.0  # a way round that takes longer is given up
+ROUND_MPS = 0.7  # speed on the way round
+CLEAR_M = 2.0  # a way is free again that is so far clear ahead
+CREEPING_MPS = 0.3  # who gets on no faster still waits
+STILL_MPS = 0.1  # a slower ego stands
+
+
+class Avoidance:
+    """Keeps one body on foot out of the others, in one episode.
+
+    Attributes:
+        waited: for how long it has been kept from walking [s].
+        tired: whether that is longer than it waits.
+    """
+
+    def __init__(self, scene: Scene, index: int) -> None:
+        self.scene, self.index = scene, index
+        self.waited, self.tired = 0.0, False
+        self._turning: float | None = None  # the heading from which it turns back
+        self._until: float | None = None  # when it gives up to go round, and to which side it goes
+        self._side = 1.0
+
+    def along(self, snapshot: Snapshot, state: BodyState, wanted: Action) -> Action:
+        """The action wanted, or a brake where that leads into somebody."""
+        if self._turning is not None and abs(wrap(state.o - self._turning)) > math.pi / 2:
+            self._turning = None
+        blocker = self._blocker(snapshot, state, wanted, close=self._turning is not None)
+        if blocker is None:
+            if state.v > CREEPING_MPS or wanted.throttle <= 0.0:
+                self.waited, self.tired = 0.0, False
+            return wanted
+        self.waited += self.scene.dt
+        first = any(t.id == blocker.id for t in snapshot.testers[: self.index])
+        self.tired = self.waited > (YIELDING_S if first else PATIENCE_S)
+        self._side = -1.0 if _aside(state, blocker) >= 0.0 else 1.0
+        return _brake(state, self.scene.dt)
+
+    def across(
+        self, snapshot: Snapshot, state: BodyState, wanted: Action, heading: float
+    ) -> Action:
+        """The same on a way with that heading, and round whoever stays in it."""
+        if state.v <= 0.0 and wanted.throttle <= 0.0:
+            self.rest()
+        if self._until is None:
+            action = self.along(snapshot, state, wanted)
+            if not self.tired:
+                return action
+            self._until, self.waited = snapshot.time + ROUND_S, 0.0
+        ahead = stretched(_narrow(state.box._replace(heading=heading), BRUSH_M), CLEAR_M)
+        is_clear = not any(overlap(ahead, near[0].box) for near in self._others(snapshot, state))
+        if is_clear or snapshot.time > self._until:
+            self.rest()
+            return self.along(snapshot, state, wanted)
+        aside = walk(state, heading + self._side * math.pi / 2, ROUND_MPS, self.scene.dt)
+        if self._blocker(snapshot, state, aside, close=True) is None:
+            self.waited = 0.0
+            return aside
+        self.waited += self.scene.dt
+        if self.waited > YIELDING_S:  # then on the other side
+            self._side, self.waited = -self._side, 0.0
+        return _brake(state, self.scene.dt)
+
+    def rest(self) -> None:
+        """Forget that it waited."""
+        self._until = self._turning = None
+        self.waited, self.tired = 0.0, False
+
+    def turn_back(self, state: BodyState) -> None:
+        """Let it turn where it is, close to whoever is ahead."""
+        self.rest()
+        self._turning = state.o
+
+    def _blocker(
+        self, snapshot: Snapshot, state: BodyState, action: Action, *, close: bool
+    ) -> BodyState | None:
+        """Somebody before whom the body could not stop any more after an action.
+
+        ``close``: who is ahead is passed by a hair's breadth, and left if it is in the body.
+        """
+        body, x, y, v, o = state
+        if v <= 0.0 and action.throttle <= 0.0:
+            return None
+        near = tuple(self._others(snapshot, state))
+        if not near:
+            return None
+        kind, dt = body.kind, self.scene.dt
+        keep = 0.0 if close else KEEP_M + (START_M if v <= 0.0 else 0.0)
+        limits = kind.wheelbase, kind.v_min, kind.v_max, dt
+        after = BodyState(body, *step_floats(x, y, v, o, *action, *limits))
+        for other, brush, yields in near:
+            enters = any(
+                overlap(_shrunk(after.box, d), other.box)
+                and not overlap(_shrunk(state.box, d), other.box)
+                for d in (brush, DEEPEST * brush)
+            )
+            if close and not enters and overlap(_shrunk(state.box, brush), other.box):
+                continue  # it turns to leave
+            met = enters or _comes_to(after, other, keep, brush, yields, dt)
+            if met and gap(state.box, other.box) <= AROUND_M:
+                return other
+        return None
+
+    def _others(
+        self, snapshot: Snapshot, state: BodyState
+    ) -> Iterator[tuple[BodyState, float, bool]]:
+        """Whoever is near: how much of it may be brushed [m] and whether it will stop."""
+        x, y, near = state.x, state.y, state.body.kind.reach + AROUND_M
+        for i, tester in enumerate(snapshot.testers):
+            reach = near + tester.body.kind.reach
+            if abs(tester.x - x) > reach or abs(tester.y - y) > reach or i == self.index:
+                continue
+            if not (snapshot.unseen and tester.id in snapshot.unseen):
+                yield tester, BRUSH_TESTER_M, i > self.index
+        for raw in snapshot.raw_background:
+            reach = near + raw[0].kind.reach
+            if abs(raw[1] - x) <= reach and abs(raw[2] - y) <= reach:
+                yield BodyState._make(raw), BRUSH_M, False
+        if snapshot.ego.v <= STILL_MPS and snapshot.sees_ego:
+            yield snapshot.ego, BRUSH_M, False
+
+
+def _comes_to(
+    state: BodyState, other: BodyState, keep: float, brush: float, yields: bool, dt: float
+) -> bool:
+    """Whether a body that stops comes nearer to another one ahead than ``keep`` [m]."""
+    kind, cos, sin = state.body.kind, math.cos(state.o), math.sin(state.o)
+    quarter, there = kind.length / 4, other.box
+    half = Box(state.x + quarter * cos, state.y + quarter * sin, state.o, 2 * quarter, kind.width)
+    if (other.x - state.x) * cos + (other.y - state.y) * sin > 0.0:
+        stops = dt - state.v / kind.throttle_min  # until then the other goes on, or stops too [s]
+        onward = stopping_way(other.body.kind, other.v, dt) if yields else other.v * stops
+        there = stretched(there, onward)
+    return overlap(stretched(_narrow(half, brush), stopping_way(kind, state.v, dt) + keep), there)
+
+
+def _shrunk(box: Box, by: float) -> Box:
+    """A box without so much on all sides [m]: it touches what the box is deeper in than that."""
+    return box._replace(length=box.length - 2.0 * by, width=box.width - 2.0 * by)
+
+
+def _narrow(box: Box, brush: float) -> Box:
+    """A box without so much of either side [m]."""
+    return box._replace(width=box.width - 2.0 * brush)
+
+
+def _aside(state: BodyState, other: BodyState) -> float:
+    """How far another body is to the left of the way straight on [m]."""
+    return (other.y - state.y) * math.cos(state.o) - (other.x - state.x) * math.sin(state.o)
+
+
+def _brake(state: BodyState, dt: float) -> Action:
+    """Stop as hard as can be, without a turn."""
+    return Action(max(state.body.kind.throttle_min, -state.v / dt), 0.0)
