@@ -33,6 +33,7 @@ from cavsumo.model.scenario import BatchPlan, plan_from
 from cavsumo.model.snapshot import BodyState, Snapshot
 from cavsumo.network.drawing.surfaces import walking_areas
 from cavsumo.network.reader import Network, lane_areas, read_network
+from cavsumo.simulation import loop
 
 ROOT = Path(__file__).resolve().parent.parent
 NETS = [ROOT / "networks" / "junction.net.xml"]
@@ -88,7 +89,7 @@ def line(plan: BatchPlan, ground: shapely.Geometry) -> str:
         for run in range(plan.runs):
             one = job(plan, run)
             try:
-                episode = simulator.play(runner.setup, runner._cast(one), one.seed, record=True)
+                episode = loop.play(runner.setup, runner._cast(one), one.seed, record=True)
             except CavsumoError as error:
                 counts["errors"] += 1
                 print(f"run {run}: {error}")
