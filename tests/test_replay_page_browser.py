@@ -106,7 +106,7 @@ def test_scrubbing_shows_who_was_where(opened: Opened, shown: Shown, frame: int)
     drawn = page.evaluate("cavsumo.zones")
     for name, points in zones._asdict().items():
         assert drawn[name] == pytest.approx([c for point in points for c in point], abs=0.006)
-    now = moment(was, trace.shapes())
+    now = moment(was, trace.shapes(), shown[2].roads)
     curves = page.evaluate("cavsumo.curves")
     assert [curves["speed"], curves["gap"]] == pytest.approx([now.speed, now.gap], abs=6e-4)
     assert (
