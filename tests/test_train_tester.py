@@ -25,7 +25,7 @@ TESTER = EXAMPLE / "tester.npz"
 def test_the_trained_tester_beats_the_random_one(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """On the same 40 seeds, which training did not see: the intervals lie apart. No torch needed."""
+    """On the same 40 seeds that training did not see the intervals lie apart. No torch needed."""
     monkeypatch.chdir(ROOT)
     agent = f"policy:{TESTER.relative_to(ROOT)}"
     words = ["--agent", agent, "--agent", "random", "--runs", "40", "--seed", "7"]
