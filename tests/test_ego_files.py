@@ -108,7 +108,7 @@ def test_resume_replay_and_merge_do_not_mind_outputs(
     assert main(["run", "--resume", "--runs", "4", "-o", "r.csv", "-q"]) == 0
     assert len(rows(here / "r.csv")) == 4
     capsys.readouterr()
-    assert main(["replay", "r.csv", "1"]) == 0
+    assert main(["replay", "r.csv", "1", "--trust"]) == 0
     out, err = capsys.readouterr()
     assert "the same" in out
     assert err == ""
@@ -130,7 +130,7 @@ def test_an_input_that_changes_is_noticed(
     capsys.readouterr()
     assert main(["run", "--resume", "--runs", "2", "-o", "r.csv", "-q"]) == 2
     assert f"sha256: {name} was" in capsys.readouterr().err
-    assert main(["replay", "r.csv", "0"]) == 0
+    assert main(["replay", "r.csv", "0", "--trust"]) == 0
     assert f"sha256: {name} was" in capsys.readouterr().err
 
 

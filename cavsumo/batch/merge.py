@@ -13,7 +13,7 @@ from cavsumo.batch.summary import Ended
 from cavsumo.batch.tally import Tally
 from cavsumo.errors import ResultsError
 from cavsumo.results.provenance import differences
-from cavsumo.results.reading import ego_log_name, whole_lines
+from cavsumo.results.reading import ego_log_name, inside, whole_lines
 from cavsumo.results.rows import Outcome
 from cavsumo.results.writing import Recorder
 
@@ -105,14 +105,14 @@ def _trace_of(part: Path, row: dict[str, str]) -> str:
     if not row["trace"]:
         return ""
     try:
-        return (part.parent / row["trace"]).read_text(encoding="utf-8")
+        return inside(part, row["trace"]).read_text(encoding="utf-8")
     except (OSError, UnicodeDecodeError) as error:
         raise ResultsError(f"results {str(part)!r}: trace of run {row['run']}: {error}") from error
 
 
 def _log_of(part: Path, run: int) -> str:
     """What the ego printed in an episode, empty for nothing."""
-    file = part.parent / ego_log_name(part, run)
+    file = inside(part, ego_log_name(part, run))
     try:
         return file.read_text(encoding="utf-8") if file.exists() else ""
     except (OSError, UnicodeDecodeError) as error:

@@ -15,6 +15,7 @@ import numpy as np
 
 from cavsumo.agents.casting import check_agents, learners, make_agents
 from cavsumo.agents.manoeuvres import types_for
+from cavsumo.agents.policy import policy_file
 from cavsumo.assertions import make_assertions
 from cavsumo.egos import make_ego
 from cavsumo.egos.base import Ego
@@ -127,7 +128,7 @@ def wishes(plan: BatchPlan, kind: Kind, ego: Ego) -> Wishes:
         volume = Volume(*scenario.traffic, duration=scenario.end + BEYOND_S, seed=seed)
     return Wishes(
         kind=kind,
-        types=scenario.approaches or _types(plan),
+        types=scenario.approaches or approach_types(plan),
         jaywalk=scenario.jaywalk,
         volume=volume,
         signal=scenario.signal,
@@ -159,9 +160,12 @@ def _check_kind(plan: BatchPlan, kind: Kind) -> None:
             )
 
 
-def _types(plan: BatchPlan) -> tuple[str, ...]:
+def approach_types(plan: BatchPlan) -> tuple[str, ...]:
     """The types of approach on which all agents can do the one manoeuvre asked of them."""
-    agents = [agent for label in plan.cast for agent in make_agents(plan, label)]
+    agents = [
+        None if policy_file(name) else make_agents(plan, label)[0]
+        for label, name in plan.cast.items()
+    ]
     names = {getattr(agent, "manoeuvre", "auto") for agent in agents}
     return types_for(names.pop()) if len(names) == 1 else ()
 

@@ -4,19 +4,21 @@ from __future__ import annotations
 
 import dataclasses
 import shlex
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, NamedTuple
 
 from cavsumo.agents.casting import learners
 from cavsumo.batch.jobs import Job, job
+from cavsumo.batch.prepared import PreparedBatch, prepare
+from cavsumo.batch.trust import check_trust
 from cavsumo.batch.worker import Worker, search
 from cavsumo.errors import DivergenceError, InputError, ResultsError
 from cavsumo.model.checksums import checksum
 from cavsumo.model.scenario import BatchPlan, Scenario
 from cavsumo.results.columns import COLUMNS
-from cavsumo.results.reading import STARTING, read_manifest, read_rows
+from cavsumo.results.reading import STARTING, inside, read_manifest, read_rows
 from cavsumo.results.rows import Outcome, Row, cell
 from cavsumo.results.traces import NOT_REPLAYED, Trace, read_trace
 
@@ -32,6 +34,7 @@ class Record:
         origin: the batch's manifest, or the trace's head: versions and checksums.
         file: where it was found.
         alone: whether that is a trace, without the episodes before it.
+        allowed: the egos and assertions from outside that it may use; None for all (``trust``).
     """
 
     plan: BatchPlan
@@ -40,6 +43,7 @@ class Record:
     origin: Mapping[str, Any]
     file: Path
     alone: bool = False
+    allowed: Collection[str] | None = ()
 
     @property
     def run(self) -> int:
@@ -67,12 +71,12 @@ class Difference(NamedTuple):
 # Found
 
 
-def recorded(csv_file: Path, run: int) -> Record:
+def recorded(csv_file: Path, run: int, allowed: Collection[str] | None = ()) -> Record:
     """An episode of a batch."""
     plan, manifest = recorded_plan(csv_file)
     row = recorded_row(csv_file, run)
-    trace = read_trace(csv_file.parent / row["trace"]) if row.get("trace") else None
-    return Record(plan, row, trace, manifest, csv_file)
+    trace = read_trace(inside(csv_file, row["trace"])) if row.get("trace") else None
+    return Record(plan, row, trace, manifest, csv_file, allowed=allowed)
 
 
 def recorded_plan(csv_file: Path) -> tuple[BatchPlan, dict[str, Any]]:
@@ -94,7 +98,7 @@ def recorded_row(csv_file: Path, run: int) -> dict[str, str]:
     return rows[str(run)]
 
 
-def recorded_alone(file: Path) -> Record:
+def recorded_alone(file: Path, allowed: Collection[str] | None = ()) -> Record:
     """The episode in a trace; raises ResultsError when it cannot be played from that alone."""
     trace, name = read_trace(file), f"trace {str(file)!r}"
     head = trace.head
@@ -116,7 +120,7 @@ def recorded_alone(file: Path) -> Record:
             f"{name}: does not hold what agent {row['agent']} had learned before, which is large; "
             "replay it from its results"
         )
-    return Record(plan, row, trace, head, file, alone=True)
+    return Record(plan, row, trace, head, file, alone=True, allowed=allowed)
 
 
 def located(record: Record, net: Path | None, routes: Path | None) -> Record:
@@ -167,6 +171,12 @@ def _file(record: Record, option: str, was: Path, given: Path | None) -> Path:
 
 
 # Played again
+
+
+def prepared_again(record: Record) -> PreparedBatch:
+    """What plays a record; raises InputError when that would use what only its file names."""
+    check_trust(record.plan.scenario, record.file, record.allowed)
+    return prepare(record.plan)
 
 
 def replayed(worker: Worker, record: Record) -> Outcome:

@@ -15,6 +15,7 @@ import pandas
 
 from cavsumo.egos.base import EGO_KIND
 from cavsumo.report.load import Evidence
+from cavsumo.results.reading import inside
 from cavsumo.results.traces import read_moments
 
 Pose = Sequence[float]  # x, y [m], v [m/s], o [rad]
@@ -60,15 +61,16 @@ def described(evidence: Evidence) -> dict[int, Described]:
 def _each(evidence: Evidence, tests: pandas.DataFrame) -> Iterator[tuple[int, Described]]:
     """The tests one by one; only one trace is in memory at a time."""
     for index, row in zip(tests.index, tests[USED].to_dict("records"), strict=True):
-        folder = evidence.batches[row["batch"]].csv_file.parent
-        yield int(index), describe(row, folder)
+        yield int(index), describe(row, evidence.batches[row["batch"]].csv_file)
 
 
-def describe(row: Mapping[str, Any], folder: Path) -> Described:
-    """One test, from its row and from the trace it names, relative to a folder."""
+def describe(row: Mapping[str, Any], csv_file: Path) -> Described:
+    """One test, from its row and from the trace it names, beside its results file."""
     failed = row["outcome"] == "violated"
     times = [row["trigger_time_s"], *([row["violation_time_s"]] if failed else [])]
-    moments = read_moments(folder / row["trace"], times) if row["trace"] else [None] * len(times)
+    moments: Sequence[Moment | None] = [None] * len(times)
+    if row["trace"]:
+        moments = read_moments(inside(csv_file, row["trace"]), times)
     trigger = _event(moments[0], row["tester"], side_ahead)
     if not failed:
         return Described(trigger, None)

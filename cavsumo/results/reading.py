@@ -5,7 +5,7 @@ from __future__ import annotations
 import csv
 import json
 from collections.abc import Iterator
-from pathlib import Path
+from pathlib import Path, PureWindowsPath
 from typing import TYPE_CHECKING, Any
 
 from cavsumo.errors import ResultsError
@@ -28,6 +28,23 @@ def trace_name(csv_file: Path, run: int) -> str:
 def ego_log_name(csv_file: Path, run: int) -> str:
     """Where lies what the ego printed in an episode, relative to the results file."""
     return f"{csv_file.stem}/run{run:06d}.ego.log"
+
+
+def inside(csv_file: Path, name: str) -> Path:
+    """The file of that name in the folder of a results file, links followed.
+
+    Raises ResultsError for a name that leads out of the folder: one that is absolute, one with
+    "..", one that follows a link.
+    """
+    folder, parts = csv_file.parent, PureWindowsPath(name)  # which knows both separators
+    try:
+        out = bool(parts.anchor or ".." in parts.parts)
+        out = out or not (folder / name).resolve().is_relative_to(folder.resolve())
+    except (OSError, ValueError, RuntimeError) as error:  # a null character, links in a circle
+        raise ResultsError(f"results {str(csv_file)!r}: {name!r} is no name of a file") from error
+    if out:
+        raise ResultsError(f"results {str(csv_file)!r}: {name!r} leads out of their folder")
+    return folder / name
 
 
 def read_manifest(csv_file: Path) -> dict[str, Any]:

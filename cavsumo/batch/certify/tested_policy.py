@@ -17,8 +17,7 @@ from cavsumo.agents.casting import learners, teams, tester_bodies
 from cavsumo.agents.policy import parameters_of, policy_file
 from cavsumo.agents.recorded import action_between
 from cavsumo.batch.preflight import recorded_settings
-from cavsumo.batch.prepared import prepare
-from cavsumo.batch.replay import Record, known, replayed
+from cavsumo.batch.replay import Record, known, prepared_again, replayed
 from cavsumo.batch.worker import Worker
 from cavsumo.errors import InputError, ResultsError, UnknownName
 from cavsumo.model.labels import cast_of
@@ -157,7 +156,7 @@ def _known_before(record: Record) -> Memory | None:
     if record.trace is not None and record.trace.head.get("memory_kept"):
         memory = record.trace.head["memory"]
         return None if memory is None else tuple(memory)
-    with Worker(prepare(plan)) as worker:
+    with Worker(prepared_again(record)) as worker:
         return known(worker, record.run)
 
 
@@ -165,7 +164,7 @@ def _trace(record: Record) -> Trace:
     """The trace of an episode; it is played again where none was kept."""
     if record.trace is not None:
         return record.trace
-    with Worker(prepare(record.plan)) as worker:
+    with Worker(prepared_again(record)) as worker:
         again = replayed(worker, record)
     if not again.trace:
         raise InputError(f"--open-loop: run {record.run} ended in an error: it has no actions")

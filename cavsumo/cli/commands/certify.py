@@ -27,13 +27,14 @@ from cavsumo.batch.certify.tested_policy import Subject, of_policy, of_run, sett
 from cavsumo.batch.certify.used_seeds import Used, fresh_seed, used
 from cavsumo.batch.executors import Means
 from cavsumo.batch.preflight import CheckedBatch, Manner, checked
-from cavsumo.batch.prepared import PreparedBatch, prepare
-from cavsumo.batch.replay import Record, recorded, recorded_plan
+from cavsumo.batch.prepared import PreparedBatch
+from cavsumo.batch.replay import Record, prepared_again, recorded, recorded_plan
+from cavsumo.batch.trust import check_trust
 from cavsumo.cli.commands.run import exit_status, played
 from cavsumo.egos import make_ego
 from cavsumo.errors import Exit, InputError
 from cavsumo.model.bodies import kind_named
-from cavsumo.model.labels import labelled
+from cavsumo.model.labels import cast_of, labelled
 from cavsumo.model.scenario import BatchPlan, Params
 from cavsumo.model.seeds import starts_generator
 from cavsumo.model.study import Part, product
@@ -53,6 +54,7 @@ class CertifyOptions:
         param: parameters of the agent in place of its own.
         egos: as a command line names them.
         ego_param: their parameters, ``LABEL.KEY``.
+        trust: use egos and assertions from outside that only the results name.
         runs, seed: episodes an ego, and where their seeds come from.
         apart: other results whose seeds are not to be used.
         confidence: of the bounds for all egos together.
@@ -69,6 +71,7 @@ class CertifyOptions:
     param: Params = dataclasses.field(default_factory=dict)
     egos: Sequence[str] = ()
     ego_param: Params = dataclasses.field(default_factory=dict)
+    trust: bool = False
     runs: int = 100
     seed: int = 1
     apart: Sequence[Path] = ()
@@ -88,6 +91,7 @@ def certify(order: CertifyOptions) -> int:
     means = Means(order.jobs)
     plan, manifest = recorded_plan(order.results)
     egos = opponents(order.egos, order.ego_param, plan.scenario)
+    check_trust(plan.scenario, order.results, _allowed(order), ego=not order.egos)
     seeds = used([order.results, *order.apart], order.param)
     subject, record = _subject(order, plan, manifest)
     seed = fresh_seed(order.seed, order.runs, seeds.seeds)
@@ -145,7 +149,7 @@ def _check_batches(
         return
     seed, ours = subject.starts_seed, subject.starts
     if ours is None:
-        ours = _drawn(prepare(record.plan), seed)
+        ours = _drawn(prepared_again(record), seed)
     for batch in batches:
         if _drawn(batch.prepared, seed) != list(ours):
             raise InputError(
@@ -166,13 +170,18 @@ def _drawn(prepared: PreparedBatch, seed: int) -> list[tuple[float, float, float
 # What is played
 
 
+def _allowed(order: CertifyOptions) -> frozenset[str] | None:
+    """The egos that the user named, None for whatever the results name."""
+    return None if order.trust else frozenset(cast_of(order.egos).values())
+
+
 def _subject(
     order: CertifyOptions, plan: BatchPlan, manifest: Mapping[str, Any]
 ) -> tuple[Subject, Record | None]:
     """The test, and the run that it comes from if it does."""
     if not order.test.isdecimal():
         return of_policy(order.test, plan, manifest, order.results, order.param), None
-    record = recorded(order.results, int(order.test))
+    record = recorded(order.results, int(order.test), _allowed(order))
     kept = order.starts != "fresh"
     return of_run(record, order.param, kept=kept, open_loop=order.open_loop), record
 

@@ -6,11 +6,21 @@ import sys
 from dataclasses import dataclass
 from pathlib import Path
 
-from cavsumo.batch.prepared import PreparedBatch, manifest, prepare
-from cavsumo.batch.replay import Record, compare, located, recorded, recorded_alone, replayed
+from cavsumo.batch.prepared import PreparedBatch, manifest
+from cavsumo.batch.replay import (
+    Record,
+    compare,
+    located,
+    prepared_again,
+    recorded,
+    recorded_alone,
+    replayed,
+)
+from cavsumo.batch.shown import shown_site
 from cavsumo.batch.worker import Worker
 from cavsumo.errors import Exit, InputError
 from cavsumo.interop.fcd import write_fcd
+from cavsumo.network.site import Site
 from cavsumo.results.provenance import changes
 from cavsumo.results.traces import Trace, parsed
 
@@ -25,6 +35,7 @@ class ReplayOptions:
         run: number of the episode in results; None when a trace is given.
         net, routes: where the network and the routes are, if not where they were.
         recorded: take the trace as it is and play nothing.
+        trust: play it even if that runs, imports or connects to what only the file names.
         html, fcd: files to write.
         gui: show it in sumo-gui, with so many milliseconds a timestep.
     """
@@ -33,6 +44,7 @@ class ReplayOptions:
     net: Path | None = None
     routes: Path | None = None
     recorded: bool = False
+    trust: bool = False
     html: Path | None = None
     fcd: Path | None = None
     gui: bool = False
@@ -54,24 +66,29 @@ def replay(file: Path, wanted: ReplayOptions = ReplayOptions()) -> int:
 
         check_gui(wanted.delay)
     record = _record(file, wanted)
-    prepared = prepare(record.plan)
-    trace = _recorded_trace(record) if wanted.recorded else _played(prepared, record)
+    if wanted.recorded:
+        trace: Trace | None = _recorded_trace(record)
+        site = shown_site(record.plan, trace) if wanted.shown else None
+    else:
+        prepared = prepared_again(record)
+        trace, site = _played(prepared, record), prepared.site
     if wanted.shown and trace is None:
         raise InputError(f"replay: run {record.run} ended in an error, there is nothing to show")
-    if trace is not None:
-        _show(prepared, record, trace, wanted)
+    if trace is not None and site is not None:
+        _show(site, record, trace, wanted)
     return Exit.OK
 
 
 def _record(file: Path, wanted: ReplayOptions) -> Record:
     """The episode that is meant, with its files."""
+    allowed = None if wanted.trust else ()
     if file.suffix == TRACE:
         if wanted.run is not None:
             raise InputError(f"replay: {str(file)!r} is the trace of one episode; no run is named")
-        return located(recorded_alone(file), wanted.net, wanted.routes)
+        return located(recorded_alone(file, allowed), wanted.net, wanted.routes)
     if wanted.run is None:
         raise InputError(f"replay: which run of {str(file)!r}? name its number")
-    record = recorded(file, wanted.run)
+    record = recorded(file, wanted.run, allowed)
     if wanted.net or wanted.routes:
         return located(record, wanted.net, wanted.routes)
     return record
@@ -99,15 +116,15 @@ def _played(prepared: PreparedBatch, record: Record) -> Trace | None:
     return parsed(again.trace) if again.trace else None
 
 
-def _show(prepared: PreparedBatch, record: Record, trace: Trace, wanted: ReplayOptions) -> None:
+def _show(site: Site, record: Record, trace: Trace, wanted: ReplayOptions) -> None:
     """Write and show what was asked for."""
     if wanted.fcd is not None:
         write_fcd(trace, wanted.fcd)
     if wanted.html is not None:
         from cavsumo.report.pages.replay.page import write_page
 
-        write_page(record, trace, prepared.site, wanted.html)
+        write_page(record, trace, site, wanted.html)
     if wanted.gui:
         from cavsumo.interop.gui import show
 
-        show(trace, record.plan.scenario, prepared.site, wanted.delay)
+        show(trace, record.plan.scenario, site, wanted.delay)

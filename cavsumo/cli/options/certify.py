@@ -100,6 +100,12 @@ def _add_egos(group: Any) -> None:
         metavar="LABEL.KEY=VALUE",
         help="a parameter of an ego; KEY=VALUE if there is only one",
     )
+    add(
+        "--trust",
+        action="store_true",
+        help="use the ego and the assertions of the results even if they are a command to run, a "
+        "module to import or an address to connect to; an ego named above needs no trust",
+    )
 
 
 def _add_output(group: Any) -> None:

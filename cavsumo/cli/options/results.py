@@ -30,6 +30,12 @@ def add_replay(commands: Any) -> None:
         action="store_true",
         help="show what was recorded, without running it again: with other versions, say",
     )
+    add(
+        "--trust",
+        action="store_true",
+        help="play it even if its ego or an assertion, named in the file, is a command to run, a "
+        "module to import or an address to connect to; not needed with --recorded",
+    )
     add("-n", "--net", type=Path, metavar="FILE", help="where the network is now")
     add("-r", "--routes", type=Path, metavar="FILE", help="where the routes are now")
     replay.set_defaults(command=_replay)

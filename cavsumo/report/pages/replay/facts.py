@@ -7,7 +7,7 @@ from typing import Any
 
 from cavsumo.assertions.base import HELD, INVALID, UNFAIR, VIOLATED
 from cavsumo.batch.replay import Record
-from cavsumo.egos import make_ego
+from cavsumo.egos import EGOS
 from cavsumo.model.scenario import Scenario
 from cavsumo.results.traces import Trace
 
@@ -78,8 +78,9 @@ def _preventable(row: Mapping[str, str]) -> str:
 
 def ego_words(scenario: Scenario) -> str:
     """The ego with its parameters, as they were given or, SUMO's driver, as they are."""
-    ego = make_ego(scenario.ego, scenario.ego_params)
-    params = getattr(ego, "attributes", scenario.ego_params)
+    params = scenario.ego_params
+    if scenario.ego in EGOS:  # one from outside is not built to be shown
+        params = getattr(EGOS.make(scenario.ego, params), "attributes", params)
     return " ".join((scenario.ego, *(f"{k}={v}" for k, v in params.items())))
 
 

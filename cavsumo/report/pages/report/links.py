@@ -19,7 +19,7 @@ from cavsumo.report.analysis import Report
 from cavsumo.report.load import Batch
 from cavsumo.report.pages.replay.page import write_page
 from cavsumo.report.pages.report.scenes import BatchPlace
-from cavsumo.results.reading import whole_lines
+from cavsumo.results.reading import inside, whole_lines
 from cavsumo.results.traces import read_trace
 
 FAILURES = 50  # are listed at most, or as many as are wanted as pages
@@ -146,6 +146,6 @@ def _write_page(
     assert scene.plan is not None
     assert scene.site is not None
     plan = batch.plan.model_copy(update={"scenario": scene.plan.scenario})
-    trace = read_trace(batch.csv_file.parent / row["trace"])
+    trace = read_trace(inside(batch.csv_file, row["trace"]))
     record = Record(plan, row, trace, batch.manifest, batch.csv_file)
     write_page(record, trace, scene.site, folder / look.page)

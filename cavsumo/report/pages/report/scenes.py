@@ -5,12 +5,14 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
-from cavsumo.batch.prepared import prepare
 from cavsumo.batch.replay import Record, located
+from cavsumo.batch.shown import is_ours, shown_site
 from cavsumo.errors import CavsumoError
 from cavsumo.model.scenario import BatchPlan
 from cavsumo.network.site import Site
 from cavsumo.report.load import Batch
+from cavsumo.results.reading import inside, whole_lines
+from cavsumo.results.traces import Trace, read_trace
 
 
 @dataclass(frozen=True)
@@ -50,6 +52,16 @@ def _scene(batch: Batch) -> BatchPlace:
     try:
         record = Record(batch.plan, {}, None, batch.manifest, batch.csv_file)
         plan = located(record, None, None).plan
-        return BatchPlace(name, plan, prepare(plan).site, "")
+        return BatchPlace(name, plan, shown_site(plan, _some_trace(batch)), "")
     except CavsumoError as error:
         return BatchPlace(name, None, None, str(error))
+
+
+def _some_trace(batch: Batch) -> Trace | None:
+    """A trace that tells the box of an ego from outside; None for our egos, or without traces."""
+    if is_ours(batch.plan.scenario):
+        return None
+    for _, row in whole_lines(batch.csv_file):
+        if row is not None and row["trace"]:
+            return read_trace(inside(batch.csv_file, row["trace"]))
+    return None

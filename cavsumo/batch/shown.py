@@ -1,0 +1,47 @@
+"""Where a recorded episode took place, for showing it: nobody who drove or judged is built."""
+
+from __future__ import annotations
+
+import dataclasses
+
+from cavsumo.batch.prepared import approach_types
+from cavsumo.egos import EGOS
+from cavsumo.egos.base import EGO_KIND
+from cavsumo.errors import ResultsError
+from cavsumo.model.bodies import WALKING, Kind, kind_named
+from cavsumo.model.scenario import BatchPlan, Scenario
+from cavsumo.network.site import Site, Wishes, derive_site
+from cavsumo.results.traces import Trace
+
+
+def is_ours(scenario: Scenario) -> bool:
+    """Whether the ego is built in, so that its box is known without a trace."""
+    return scenario.ego in EGOS
+
+
+def shown_site(plan: BatchPlan, trace: Trace | None) -> Site:
+    """The site of a plan without its traffic and its lights' programs, which are in the frames.
+
+    An ego from outside has the box that a trace tells, else that of cavsumo's egos. Raises
+    InputError.
+    """
+    scenario, kind = plan.scenario, kind_named(plan.scenario.kind)
+    types: tuple[str, ...] = scenario.approaches
+    if kind.name not in WALKING and not types:
+        types = approach_types(plan)
+    wishes = Wishes(kind=kind, types=types, jaywalk=scenario.jaywalk)
+    ego = _ego_kind(scenario, trace)
+    return derive_site(scenario.net, scenario.ego_route, scenario.junction, ego, wishes)
+
+
+def _ego_kind(scenario: Scenario, trace: Trace | None) -> Kind:
+    """The ego's kind, as far as its box goes."""
+    if is_ours(scenario):
+        return EGOS.make(scenario.ego, scenario.ego_params).kind
+    if trace is None:
+        return EGO_KIND
+    try:
+        _, length, width, wheelbase = trace.shapes()["ego"]
+        return dataclasses.replace(EGO_KIND, length=length, width=width, wheelbase=wheelbase)
+    except (KeyError, TypeError, ValueError) as error:
+        raise ResultsError("the trace's head does not tell the ego's box") from error
