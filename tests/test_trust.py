@@ -241,7 +241,7 @@ def test_an_egos_log_outside_the_folder_is_not_merged(
 @pytest.mark.parametrize("name", ["a\0b", "C:\\x", "\\\\host\\x", "/x", "a/../../x", ".."])
 def test_names_that_are_none(tmp_path: Path, name: str) -> None:
     """Refused on every system alike."""
-    with pytest.raises(ResultsError, match="no name of a file|leads out"):
+    with pytest.raises(ResultsError, match=r"no name of a file|leads out"):
         inside(tmp_path / "r.csv", name)
 
 
