@@ -30,7 +30,7 @@ def add_replay(commands: Any) -> None:
         action="store_true",
         help="show what was recorded, without running it again: with other versions, say",
     )
-    add("-n", "--net", type=Path, metavar="FILE", help="where the network is now")
+    add("-n", "--net", type=Path, metavar="NET", help="where the network is now, or its name")
     add("-r", "--routes", type=Path, metavar="FILE", help="where the routes are now")
     replay.set_defaults(command=_replay)
 
