@@ -128,6 +128,7 @@ def test_a_recorded_name_is_found_again_anywhere(
     assert main(["replay", "sent.jsonl"]) == 0
     assert main(["replay", "sent.jsonl", "--net", "junction"]) == 0
     assert main(["run", "--net", "junction", *FEW, "-o", "results.csv", "--resume"]) == 0
+    assert main(["run", "--resume", "-q", "--exit-zero"]) == 0  # of what was recorded, no default
 
 
 def test_another_network_of_the_same_name_is_refused_in_a_replay(

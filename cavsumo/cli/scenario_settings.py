@@ -28,7 +28,7 @@ def parts_of(options: argparse.Namespace) -> list[Part]:
     given = settings_of(options)
     if options.config:  # which says where it plays
         return read_study(Path(options.config), given)
-    return [Part("", {"net": DEFAULT, **given})]
+    return [Part("", given, {"net": DEFAULT})]
 
 
 def settings_of(options: argparse.Namespace) -> dict[str, Any]:
