@@ -76,7 +76,8 @@ def _checked(part: Part, output: Path, manner: Manner) -> CheckedBatch:
     _check_output(output)
     recorded = _recorded(output, manner)
     source = f"run: {part.name}" if part.name else "run"
-    prepared = prepare(plan_from({**recorded_settings(recorded), **part.settings}, source))
+    settings = {**part.defaults, **recorded_settings(recorded), **part.settings}
+    prepared = prepare(plan_from(settings, source))
     prepared = prepared.without(recorded_outputs(recorded))
     now = manifest(prepared)
     different = [] if recorded is None else list(differences(recorded, now))

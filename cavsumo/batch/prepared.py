@@ -109,7 +109,7 @@ def prepare(plan: BatchPlan, ego: Ego | None = None) -> PreparedBatch:
             "needs a controller, such as time-gap"
         )
     site = derive_site(
-        scenario.net, scenario.ego_route, scenario.junction, ego.kind, wishes(plan, kind, ego)
+        scenario.net_file, scenario.ego_route, scenario.junction, ego.kind, wishes(plan, kind, ego)
     )
     if scenario.embodiment == "person" and not all(area.walk for area in site.areas):
         raise InputError("jaywalk: embodiment person needs a pavement near by, and there is none")

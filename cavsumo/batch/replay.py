@@ -16,6 +16,7 @@ from cavsumo.batch.trust import check_trust
 from cavsumo.batch.worker import Worker, search
 from cavsumo.errors import DivergenceError, InputError, ResultsError
 from cavsumo.model.checksums import checksum
+from cavsumo.model.named_networks import check_network, network_file, routes_file
 from cavsumo.model.scenario import BatchPlan, Scenario
 from cavsumo.results.columns import COLUMNS
 from cavsumo.results.reading import STARTING, inside, read_manifest, read_rows
@@ -126,10 +127,14 @@ def recorded_alone(file: Path, allowed: Collection[str] | None = ()) -> Record:
 def located(record: Record, net: Path | None, routes: Path | None) -> Record:
     """The record with its files where they are here, known by their checksums.
 
-    Each is looked for where it is said to be, else where it was recorded and beside the trace.
+    Each is looked for where it is said to be, else where it was recorded and beside the trace; a
+    network that has a name is found by it.
     Raises InputError when it is nowhere, or another one.
     """
     scenario = record.plan.scenario
+    if net is not None:
+        check_network(net, "--net")
+        net = network_file(net)
     here = {"net": _file(record, "--net", scenario.net, net)}
     if scenario.routes is not None:
         here["routes"] = _file(record, "--routes", scenario.routes, routes)
@@ -153,12 +158,15 @@ def _files(scenario: Scenario) -> list[Path]:
 def _file(record: Record, option: str, was: Path, given: Path | None) -> Path:
     """Where a file of a plan is."""
     expected = dict(record.origin.get("sha256") or {}).get(str(was))
-    places = [given] if given else [was, record.file.parent / was.name]
+    recorded_at = network_file(was) if option == "--net" else routes_file(was)
+    if given is None and recorded_at.is_file() and checksum(recorded_at) == expected:
+        return was
+    places = [given] if given else [recorded_at, record.file.parent / recorded_at.name]
     there = [file for file in places if file.is_file()]
     for file in there:
         if checksum(file) == expected:
             return file
-    what = f"{was.name!r} (sha256 {str(expected)[:12]})"
+    what = f"{recorded_at.name!r} (sha256 {str(expected)[:12]})"
     if there:
         raise InputError(
             f"{option} {str(there[0])!r}: sha256 {checksum(there[0])[:12]}, not the {what} of "

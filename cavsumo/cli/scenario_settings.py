@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from cavsumo.errors import InputError
+from cavsumo.model.named_networks import DEFAULT
 
 if TYPE_CHECKING:
     from cavsumo.model.study import Part
@@ -25,7 +26,9 @@ def parts_of(options: argparse.Namespace) -> list[Part]:
     from cavsumo.model.study import Part, read_study
 
     given = settings_of(options)
-    return read_study(Path(options.config), given) if options.config else [Part("", given)]
+    if options.config:  # which says where it plays
+        return read_study(Path(options.config), given)
+    return [Part("", given, {"net": DEFAULT})]
 
 
 def settings_of(options: argparse.Namespace) -> dict[str, Any]:

@@ -24,6 +24,13 @@ from pydantic import (
 from cavsumo.errors import InputError, UnknownName
 from cavsumo.model.checks import densities
 from cavsumo.model.labels import cast_of
+from cavsumo.model.named_networks import (
+    check_network,
+    is_named,
+    network_file,
+    routes_file,
+    routes_of,
+)
 from cavsumo.model.sensors import Sensor
 
 SHARED_BY = 25  # episodes that share one simulation when asked to
@@ -39,7 +46,7 @@ class Scenario(BaseModel):
 
     model_config = ConfigDict(extra="forbid", frozen=True)
 
-    net: Path = Field(description="SUMO network")
+    net: Path = Field(description="SUMO network: a file, or one of cavsumo's by name")
     routes: Path | None = Field(None, description="background demand; none for empty roads")
     traffic: tuple[float, float] | None = Field(
         None,
@@ -149,6 +156,16 @@ class Scenario(BaseModel):
     def name(self) -> str:
         """The network's name without its endings."""
         return self.net.name.removesuffix(".gz").removesuffix(".xml").removesuffix(".net")
+
+    @property
+    def net_file(self) -> Path:
+        """The network's file, on this machine."""
+        return network_file(self.net)
+
+    @property
+    def routes_file(self) -> Path | None:
+        """The file of the background demand, on this machine."""
+        return None if self.routes is None else routes_file(self.routes)
 
 
 class BatchPlan(BaseModel):
@@ -295,6 +312,7 @@ def plan_from(settings: Mapping[str, Any], source: str) -> BatchPlan:
     check_keys(settings, source)
     if "net" not in settings:
         raise InputError(f"{source}: no network given; name one with --net FILE")
+    check_network(Path(settings["net"]), source)
     scenario = {k: v for k, v in settings.items() if k in SCENARIO_KEYS}
     if str(scenario.get("traffic")) == "none":
         del scenario["traffic"]
@@ -306,7 +324,7 @@ def plan_from(settings: Mapping[str, Any], source: str) -> BatchPlan:
         )
     except ValidationError as error:
         raise InputError(f"{source}: {_first_problem(error)}") from error
-    for file in (plan.scenario.routes, *plan.scenario.additional):
+    for file in (plan.scenario.routes_file, *plan.scenario.additional):
         if file is not None and not file.is_file():
             raise InputError(f"{source}: no such file: {str(file)!r}")
     if plan.shard and (plan.first or plan.until_tests or plan.until_half_width):
@@ -348,6 +366,8 @@ def _route_file(scenario: Mapping[str, Any], source: str) -> Path | None:
     if given is not None or drawn:
         return None if given is None or str(given) == "none" else Path(given)
     net = Path(scenario["net"])
+    if is_named(net):
+        return routes_of(net)
     stem = net.name.removesuffix(".gz").removesuffix(".xml").removesuffix(".net")
     for folder in (net.parent.parent / "routes", net.parent):
         file = folder / f"{stem}.rou.xml"

@@ -9,6 +9,7 @@ from typing import Any
 
 from cavsumo.errors import InputError
 from cavsumo.model.labels import labelled
+from cavsumo.model.named_networks import is_named, is_word
 from cavsumo.model.scenario import check_keys
 
 VARY = "vary"  # the table that makes a study of a scenario file
@@ -47,7 +48,12 @@ def _resolved(key: str, value: Any, folder: Path) -> Any:
         return value
     if isinstance(value, list):
         return [str(folder / str(v)) for v in value]
-    return str(folder / str(value))
+    file = folder / str(value)
+    if key == "net" and not file.is_file():
+        word = Path(str(value))
+        if is_named(word) or (is_word(word) and not file.exists()):
+            return str(value)
+    return str(file)
 
 
 def _resolved_agent(word: Any, folder: Path) -> Any:

@@ -19,7 +19,7 @@ import itertools
 import math
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -42,10 +42,12 @@ class Part:
     Attributes:
         name: of the combination; empty for a batch that is no part of a study.
         settings: all of the batch, flat.
+        defaults: of settings that neither these nor results that are gone on with have.
     """
 
     name: str
     settings: Settings
+    defaults: Settings = field(default_factory=dict)
 
     def output(self, whole: Path) -> Path:
         """Its results file: ``-o agency.csv`` gives ``agency-straight-testers1.csv``."""

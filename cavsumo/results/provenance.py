@@ -25,10 +25,13 @@ EXTENT = frozenset(
 def checksums(plan: BatchPlan) -> dict[str, str]:
     """The SHA-256 of every file that a plan names, those of its ego and assertions among them."""
     scenario = plan.scenario
-    files = [scenario.net, *([scenario.routes] if scenario.routes else []), *scenario.additional]
-    files += [*agent_files(plan), *ego_files(scenario.ego)]
+    found = {str(scenario.net): scenario.net_file}
+    if scenario.routes is not None and scenario.routes_file is not None:
+        found[str(scenario.routes)] = scenario.routes_file
+    files = [*scenario.additional, *agent_files(plan), *ego_files(scenario.ego)]
     files += assertion_files(scenario.assertions)
-    return {str(file): checksum(file) for file in files}
+    found |= {str(file): file for file in files}
+    return {name: checksum(file) for name, file in found.items()}
 
 
 def versions() -> dict[str, str]:

@@ -35,7 +35,7 @@ def check_ego(settings: Mapping[str, Any], deadline: float) -> int:
     def make() -> Ego:
         return make_ego(scenario.ego, scenario.ego_params)
 
-    here = ground(scenario.net, make().kind, scenario.step_length)
+    here = ground(scenario.net_file, make().kind, scenario.step_length)
 
     def scripted(check: Check) -> Callable[[], str]:
         return lambda: check(make, here)

@@ -18,6 +18,7 @@ from rich.text import Text
 from cavsumo.cli.steps import SlowSteps
 from cavsumo.egos.base import EGO_KIND
 from cavsumo.errors import Exit, InputError, NetworkError
+from cavsumo.model.named_networks import check_network, network_file
 from cavsumo.network.facts import Facts, facts
 from cavsumo.network.inspection import (
     InspectedNetwork,
@@ -74,7 +75,8 @@ def inspect(look: InspectOptions) -> int:
 def _seen(look: InspectOptions, steps: SlowSteps) -> tuple[Facts, InspectedNetwork, list[Junction]]:
     """What there is to see of a network."""
     steps.begin(f"reading {look.net}")
-    network = read_network(look.net)
+    check_network(look.net)
+    network = read_network(network_file(look.net))
     try:
         found = facts(network)
         here = ground(network, EGO_KIND.length / 2)

@@ -20,7 +20,7 @@ def add_check_ego(commands: Any) -> None:
     )
     add = check.add_argument
     add("ego", metavar="SPEC", help="as for run --ego: a name, module:Class, exec:..., tcp:...")
-    add("-n", "--net", required=True, metavar="FILE", help="the network on which it drives")
+    add("-n", "--net", required=True, metavar="NET", help="where it drives, as for run")
     add("--ego-param", action="append", default=[], metavar="KEY=VALUE", help="repeat for several")
     add("--step-length", type=float, default=0.1, metavar="S", help="timestep [s] (default 0.1)")
     add("--deadline", type=float, default=60.0, metavar="S", help="of each check [s] (default 60)")

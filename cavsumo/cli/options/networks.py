@@ -7,6 +7,13 @@ import dataclasses
 from pathlib import Path
 from typing import Any
 
+from cavsumo.model.named_networks import names
+
+
+def net_help() -> str:
+    """How a network is named on the command line."""
+    return f"SUMO network (.net.xml, .net.xml.gz), or by name: {', '.join(names())}"
+
 
 def add_inspect(commands: Any) -> None:
     """The command inspect."""
@@ -18,7 +25,7 @@ def add_inspect(commands: Any) -> None:
         allow_abbrev=False,
     )
     add = inspect.add_argument
-    add("net", type=Path, metavar="NET", help="SUMO network (.net.xml, .net.xml.gz)")
+    add("net", type=Path, metavar="NET", help=net_help())
     add("--junction", metavar="ID", help="look at this one (default: the best ones)")
     add("--top", type=int, default=5, metavar="N", help="number of junctions (default 5)")
     add("--json", dest="as_json", action="store_true", help="print JSON (docs/inspect.md)")

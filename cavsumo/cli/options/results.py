@@ -36,7 +36,7 @@ def add_replay(commands: Any) -> None:
         help="play it even if its ego or an assertion, named in the file, is a command to run, a "
         "module to import or an address to connect to; not needed with --recorded",
     )
-    add("-n", "--net", type=Path, metavar="FILE", help="where the network is now")
+    add("-n", "--net", type=Path, metavar="NET", help="where the network is now, or its name")
     add("-r", "--routes", type=Path, metavar="FILE", help="where the routes are now")
     replay.set_defaults(command=_replay)
 

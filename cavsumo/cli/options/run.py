@@ -7,7 +7,9 @@ import dataclasses
 from pathlib import Path
 from typing import Any
 
+from cavsumo.cli.options.networks import net_help
 from cavsumo.cli.scenario_settings import parts_of
+from cavsumo.model.named_networks import DEFAULT
 
 
 def add_run(commands: Any) -> None:
@@ -15,8 +17,8 @@ def add_run(commands: Any) -> None:
     run = commands.add_parser(
         "run",
         help="run a batch of episodes and report the outcomes",
-        description="Run a batch of episodes and report the outcomes. Every option but --net has "
-        "a default; a TOML file given with -c may hold the same keys, the command line wins.",
+        description="Run a batch of episodes and report the outcomes. Every option has a "
+        "default; a TOML file given with -c may hold the same keys, the command line wins.",
         allow_abbrev=False,
     )
     _add_scenario(run.add_argument_group("scenario"))
@@ -82,7 +84,7 @@ def _add_stopping(group: Any) -> None:
 
 def _add_scenario(group: Any) -> None:
     add = group.add_argument
-    add("-n", "--net", "--net-file", metavar="FILE", help="SUMO network (.net.xml, .net.xml.gz)")
+    add("-n", "--net", "--net-file", metavar="NET", help=f"{net_help()} (default {DEFAULT})")
     add(
         "-r",
         "--routes",

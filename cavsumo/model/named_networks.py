@@ -1,0 +1,62 @@
+"""The networks that come with cavsumo, by name: ``crossing`` instead of a path.
+
+They lie in the package (``data/`` of a wheel) or, in a checkout, in ``networks/`` and ``routes/``
+beside it. Plans, manifests and traces hold the name and not the place, which differs from machine
+to machine. A file of that name goes before; a folder does not, since traces have folders.
+"""
+
+from __future__ import annotations
+
+import importlib.resources
+from pathlib import Path
+
+from cavsumo.errors import UnknownName
+
+DEFAULT = "crossing"
+ENDING = ".net.xml"
+ROUTES = Path("cavsumo/data/routes")  # stands for the folder of their demand, wherever it is
+
+
+def names() -> list[str]:
+    """The names of the networks that there are, in order."""
+    return sorted(f.name.removesuffix(ENDING) for f in _folder("networks").glob(f"*{ENDING}"))
+
+
+def is_named(net: Path) -> bool:
+    """Whether this is the name of a network, and no file."""
+    return not net.is_file() and str(net) in names()
+
+
+def network_file(net: Path) -> Path:
+    """The file of a network: of the one with that name, else the path as it is."""
+    return _folder("networks") / f"{net}{ENDING}" if is_named(net) else net
+
+
+def check_network(net: Path, source: str = "") -> None:
+    """Raise UnknownName for a word that is no path and the name of no network."""
+    if is_word(net) and not net.exists() and not is_named(net):
+        raise UnknownName("network", str(net), names(), source)
+
+
+def is_word(net: Path) -> bool:
+    """Whether this can be meant as a name: no folder before it, no ending after it."""
+    return net.name == str(net) and bool(net.name) and not net.suffix
+
+
+def routes_of(name: Path) -> Path | None:
+    """The demand of a named network as plans hold it; None if it has none."""
+    routes = ROUTES / f"{name}.rou.xml"
+    return routes if routes_file(routes).is_file() else None
+
+
+def routes_file(routes: Path) -> Path:
+    """The file of a demand: of a named network's, else the path as it is."""
+    named = routes.parent == ROUTES and not routes.is_file()
+    return _folder("routes") / routes.name if named else routes
+
+
+def _folder(sort: str) -> Path:
+    """The folder of the networks or the routes: in the package, else beside it in a checkout."""
+    package = Path(str(importlib.resources.files("cavsumo")))
+    packed = package / "data" / sort
+    return packed if packed.is_dir() else package.parent / sort
