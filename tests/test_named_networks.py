@@ -232,3 +232,15 @@ def test_a_scenario_file_still_says_where_it_plays(
     (away / "scenario.toml").write_text("runs = 1\n")
     assert main(["run", "-c", "scenario.toml"]) == 2
     assert "no network given" in capsys.readouterr().err
+
+
+def test_a_run_by_name_is_shown_without_playing_it(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The report's pages and a recorded replay find the network by its name, anywhere."""
+    monkeypatch.chdir(tmp_path)
+    words = ["--runs", "2", "--trace", "all", "-o", "found.csv", "-q", "--exit-zero"]
+    assert main(["run", "--net", "crossing", *words]) == 0
+    assert main(["replay", "found.csv", "0", "--recorded", "--html", "run0.html"]) == 0
+    assert main(["report", "found.csv", "--html", "report.html"]) == 0
+    assert "OpenStreetMap" in (tmp_path / "report.html").read_text(encoding="utf-8")

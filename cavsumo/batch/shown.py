@@ -31,7 +31,7 @@ def shown_site(plan: BatchPlan, trace: Trace | None) -> Site:
         types = approach_types(plan)
     wishes = Wishes(kind=kind, types=types, jaywalk=scenario.jaywalk)
     ego = _ego_kind(scenario, trace)
-    return derive_site(scenario.net, scenario.ego_route, scenario.junction, ego, wishes)
+    return derive_site(scenario.net_file, scenario.ego_route, scenario.junction, ego, wishes)
 
 
 def _ego_kind(scenario: Scenario, trace: Trace | None) -> Kind:
