@@ -18,7 +18,7 @@ from __future__ import annotations
 
 import time
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -188,33 +188,41 @@ def _certified(
     none = np.zeros_like(value)
     scale = _scale(play)
     value, pair, left = approach(play, value, none, 1e-4 * scale, "the value", tell)
-    time = time_of(play, made_proper(play, pair, value))
-    steps = np.append(np.ones(play.arena.size), 0.0) if time is None else time
+    expected = time_of(play, made_proper(play, pair, value))
+    steps = np.append(np.ones(play.arena.size), 0.0) if expected is None else expected
     if left > 1e-3 * scale + 64.0 * EPSILON * scale * float(steps.max()):
         raise NotCertified(
             f"no bounds could be proven: the Bellman equation was met up to {left:.1e} only, with "
             f"rewards up to {scale:.3g}"
         )
     noise = _noise(game, verdict.reading, play, value, left)
-    return _closest(game, verdict, play, value, pair, steps, noise, precision, tell)
+    return _closest(game, verdict, play, _Near(value, pair, steps, noise), precision, tell)
+
+
+class _Near(NamedTuple):
+    """What is known of the value before there are bounds.
+
+    Attributes:
+        value: nearly V.
+        pair: attains T V.
+        steps: nearly the expected numbers of steps to a goal.
+        noise: how far rounding may take an advantage, for each state.
+    """
+
+    value: Floats
+    pair: Any
+    steps: Floats
+    noise: Floats
 
 
 def _closest(
-    game: Game,
-    verdict: Solvability,
-    play: Play,
-    value: Floats,
-    pair: Any,
-    steps: Floats,
-    noise: Floats,
-    precision: float,
-    tell: Tell,
+    game: Game, verdict: Solvability, play: Play, near: _Near, precision: float, tell: Tell
 ) -> Certificate:
     """Bounds tried with one e after another, until they hold and are close enough."""
-    best, e = None, precision / (3.0 * float(steps.max()))
+    best, e = None, precision / (3.0 * float(near.steps.max()))
     for _ in range(ATTEMPTS):
-        e = max(e, 1.25 * coarseness(value))
-        found = _bounds(game, verdict, play, value, pair, steps, e, noise, tell)
+        e = max(e, 1.25 * coarseness(near.value))
+        found = _bounds(game, verdict, play, near, e, tell)
         tell("checking the bounds", np.inf)
         width = _width(found) if holds(game, found) else np.inf
         if width <= precision:
@@ -255,17 +263,10 @@ def _noise(game: Game, reading: Reading, play: Play, value: Floats, left: float)
 
 
 def _bounds(
-    game: Game,
-    verdict: Solvability,
-    play: Play,
-    value: Floats,
-    pair: Any,
-    steps: Floats,
-    e: float,
-    noise: Floats,
-    tell: Tell,
+    game: Game, verdict: Solvability, play: Play, near: _Near, e: float, tell: Tell
 ) -> Certificate:
     """The solutions of the game with rewards lowered and raised by e and some noise."""
+    value, pair, steps, noise = near
     shift = np.append(np.maximum(e, noise[:-1]), 0.0)
     residual = max(0.5 * e, min(0.8 * e, coarseness(value)))
     low, low_pair, _ = approach(
