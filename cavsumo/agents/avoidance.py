@@ -21,7 +21,7 @@ from cavsumo.model.geometry import Box, gap, overlap
 from cavsumo.model.kinematics import step_floats, wrap
 from cavsumo.model.scene import Scene
 from cavsumo.model.snapshot import AROUND_M, BodyState, Snapshot
-from cavsumo.model.stopping_way import stopping_way, stretched
+from cavsumo.model.stopping_way import is_clear, stopping_way, stretched
 
 KEEP_M = 0.65  # room kept to who is ahead: enough to turn back in
 START_M = 0.3  # so much more of it lets one who stands go on, or it would creep up
@@ -78,8 +78,8 @@ class Avoidance:
                 return action
             self._until, self.waited = snapshot.time + ROUND_S, 0.0
         ahead = stretched(_narrow(state.box._replace(heading=heading), BRUSH_M), CLEAR_M)
-        is_clear = not any(overlap(ahead, near[0].box) for near in self._others(snapshot, state))
-        if is_clear or snapshot.time > self._until:
+        boxes = (other.box for other, _, _ in self._others(snapshot, state))
+        if is_clear(ahead, boxes) or snapshot.time > self._until:
             self.rest()
             return self.along(snapshot, state, wanted)
         aside = walk(state, heading + self._side * math.pi / 2, ROUND_MPS, self.scene.dt)
