@@ -30,7 +30,7 @@ class Simulations:
         self._types = folder / "types.add.xml"
         self._types.write_text(type_file(scenario, ego), encoding="utf-8")
         self._kept = folder / "kept.add.xml"  # what stays of the demand when we send it ourselves
-        self._routes = scenario.routes_file
+        self._net, self._routes = scenario.net_file, scenario.routes_file
         if site.demand is not None:
             self._routes = folder / "traffic.rou.xml"
             self._routes.write_text(site.demand, encoding="utf-8")
@@ -81,7 +81,7 @@ class Simulations:
         more = [*scenario.additional, self._types]
         if shared and self._kept.exists():
             more.append(self._kept)
-        files = ["-n", str(scenario.net_file), "-a", ",".join(str(f) for f in more)]
+        files = ["-n", str(self._net), "-a", ",".join(str(f) for f in more)]
         if self._routes is not None and not shared:
             files += ["-r", str(self._routes)]
         options = [word for k, v in OPTIONS.items() for word in (f"--{k}", v)]
