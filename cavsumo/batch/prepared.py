@@ -77,7 +77,7 @@ class PreparedBatch:
         return {str(file) for file in data_files(self.plan.scenario.ego)}
 
     def without(self, outputs: Collection[str]) -> PreparedBatch:
-        """The same setting, but some files are no inputs."""
+        """The same batch, but some files are no inputs."""
         kept = {name: sum for name, sum in self.checksums.items() if name not in outputs}
         return dataclasses.replace(self, checksums=kept)
 
@@ -128,7 +128,7 @@ def wishes(plan: BatchPlan, kind: Kind, ego: Ego) -> Wishes:
         volume = Volume(*scenario.traffic, duration=scenario.end + BEYOND_S, seed=seed)
     return Wishes(
         kind=kind,
-        types=scenario.approaches or approach_types(plan),
+        types=approach_types(plan, kind),
         jaywalk=scenario.jaywalk,
         volume=volume,
         signal=scenario.signal,
@@ -160,8 +160,14 @@ def _check_kind(plan: BatchPlan, kind: Kind) -> None:
             )
 
 
-def approach_types(plan: BatchPlan) -> tuple[str, ...]:
-    """The types of approach on which all agents can do the one manoeuvre asked of them."""
+def approach_types(plan: BatchPlan, kind: Kind) -> tuple[str, ...]:
+    """The types of approach of a plan's vehicles; empty for all types, and for walkers.
+
+    Those that the plan names, else those on which all agents can do the one manoeuvre that is asked
+    of them.
+    """
+    if plan.scenario.approaches or kind.name in WALKING:
+        return plan.scenario.approaches
     agents = [
         None if policy_file(name) else make_agents(plan, label)[0]
         for label, name in plan.cast.items()

@@ -8,7 +8,7 @@ from cavsumo.batch.prepared import approach_types
 from cavsumo.egos import EGOS
 from cavsumo.egos.base import EGO_KIND
 from cavsumo.errors import ResultsError
-from cavsumo.model.bodies import WALKING, Kind, kind_named
+from cavsumo.model.bodies import Kind, kind_named
 from cavsumo.model.scenario import BatchPlan, Scenario
 from cavsumo.network.site import Site, Wishes, derive_site
 from cavsumo.results.traces import Trace
@@ -26,10 +26,7 @@ def shown_site(plan: BatchPlan, trace: Trace | None) -> Site:
     InputError.
     """
     scenario, kind = plan.scenario, kind_named(plan.scenario.kind)
-    types: tuple[str, ...] = scenario.approaches
-    if kind.name not in WALKING and not types:
-        types = approach_types(plan)
-    wishes = Wishes(kind=kind, types=types, jaywalk=scenario.jaywalk)
+    wishes = Wishes(kind=kind, types=approach_types(plan, kind), jaywalk=scenario.jaywalk)
     ego = _ego_kind(scenario, trace)
     return derive_site(scenario.net_file, scenario.ego_route, scenario.junction, ego, wishes)
 

@@ -106,7 +106,7 @@ class AvoidabilityCheck:
     def broken(self) -> Assertion:
         """The assertion that was violated.
 
-        Known by its name: what the stage's assertions judge is of the latest episode played there.
+        Known by its name: what the setup's assertions judge is of the latest episode played there.
         """
         name = self.episode.judgement.assertion
         return next(a for a in self.setup.assertions if a.name == name)
