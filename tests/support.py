@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import contextlib
 import importlib.util
 import shutil
+import subprocess
+import sys
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from concurrent.futures import Executor, Future
 from pathlib import Path
 from typing import Any
@@ -93,3 +96,15 @@ class Troupe(Executor):
         """Have episodes played as some of the whole batch."""
         _, jobs = args
         return self.executor.submit(fn, self.own, jobs)
+
+
+@contextlib.contextmanager
+def serving(file: Path) -> Iterator[str]:
+    """The Python example as a server; its spec."""
+    line = [sys.executable, str(file), "--port", "0"]
+    with subprocess.Popen(line, stdout=subprocess.PIPE, text=True) as server:
+        assert server.stdout
+        try:
+            yield f"tcp:127.0.0.1:{server.stdout.readline().split()[-1]}"
+        finally:
+            server.kill()

@@ -10,6 +10,7 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
+from support import serving
 
 from cavsumo.cli.command_line import main
 from cavsumo.egos import EGOS, Acceleration, Command, Ego
@@ -41,13 +42,8 @@ DOCUMENTED = documented()
 @pytest.fixture(scope="module")
 def server() -> Iterator[str]:
     """The Python example as a server; its spec."""
-    line = [sys.executable, str(PYTHON_EXAMPLE), "--port", "0"]
-    with subprocess.Popen(line, stdout=subprocess.PIPE, text=True) as process:
-        assert process.stdout
-        try:
-            yield f"tcp:127.0.0.1:{process.stdout.readline().split()[-1]}"
-        finally:
-            process.kill()
+    with serving(PYTHON_EXAMPLE) as spec:
+        yield spec
 
 
 @pytest.fixture(scope="module")

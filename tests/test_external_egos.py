@@ -20,7 +20,7 @@ from types import ModuleType
 from typing import Any
 
 import pytest
-from support import alive, rows, traces, until, workers_of
+from support import alive, rows, serving, traces, until, workers_of
 
 from cavsumo.agents.base import Scene
 from cavsumo.cli import main
@@ -497,18 +497,6 @@ class Careful:
             ahead[0] if ahead else None, bodies,
         ))
 """
-
-
-@contextlib.contextmanager
-def serving(file: Path) -> Iterator[str]:
-    """The Python example as a server; its spec."""
-    line = [sys.executable, str(file), "--port", "0"]
-    with subprocess.Popen(line, stdout=subprocess.PIPE, text=True) as server:
-        assert server.stdout
-        try:
-            yield f"tcp:127.0.0.1:{server.stdout.readline().split()[-1]}"
-        finally:
-            server.kill()
 
 
 @pytest.fixture(scope="module")

@@ -52,7 +52,7 @@ def watched(
     traffic: list[Pose] | None = None,
     roads: Roads | None = ROADS,
 ) -> ValidityMonitor:
-    """The umpire who saw these poses of the testers."""
+    """The validity monitor that saw these poses of the testers."""
     bodies = tuple(Body(f"tester{i}", kind) for i in range(len(moments[0])))
     driver = Body("ego", CAR)
     starts = tuple(Start(x, y, o) for x, y, _, o in moments[0])
@@ -156,14 +156,14 @@ def test_the_standing_ego() -> None:
     bodies = walk((0.0, -1.3, 1.4, LEFT), steps=6)
     stands = (0.0, 0.0, 0.0, 0.0)
     assert judged(*bodies, ego=stands) == ""
-    umpire_of_both = _with_ego(bodies, [stands] * 5 + [(0.1, 0.0, 1.0, 0.0)])
-    assert umpire_of_both.startswith("tester0 moved into ego")
+    both = _with_ego(bodies, [stands] * 5 + [(0.1, 0.0, 1.0, 0.0)])
+    assert both.startswith("tester0 moved into ego")
     lightly = _with_ego(bodies[:2] + [bodies[1]] * 2, [stands] * 3 + [(0.1, 0.0, 1.0, 0.0)])
     assert lightly == ""
 
 
 def _with_ego(moments: list[list[Pose]], egos: list[Pose]) -> str:
-    """What the umpire says of one pedestrian while the ego moves too."""
+    """What the validity monitor says of one pedestrian while the ego moves too."""
     body, driver = Body("tester0", PEDESTRIAN), Body("ego", CAR)
     path = Path([(0.0, 0.0), (100.0, 0.0)])
     monitor = ValidityMonitor(Scene(DT, driver, path, (body,), (Start(0.0, -1.3, LEFT),), ROADS))
