@@ -9,11 +9,11 @@ import random
 import re
 from collections.abc import Callable, Iterator
 from functools import partial
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+from support import DATA, ROOT
 
 from cavsumo.assertions.formula import FormulaAssertion
 from cavsumo.assertions.formulas import SIGNALS, Moment, View, robustness, rule
@@ -40,9 +40,8 @@ from cavsumo.model.polyline import Path as Polyline
 from cavsumo.model.scene import Scene
 from cavsumo.model.snapshot import BodyState, Snapshot
 
-VECTORS = Path(__file__).parent / "data" / "formula_vectors.json"
+VECTORS = DATA / "formula_vectors.json"
 CASES = json.loads(VECTORS.read_text(encoding="utf-8"))["cases"]
-ROOT = Path(__file__).parents[1]
 WORDS = {"inf": math.inf, "tiny": TINY, "-tiny": -TINY}
 COMPARE: dict[str, Callable[[float, float], bool]] = {
     "<": operator.lt,

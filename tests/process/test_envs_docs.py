@@ -10,6 +10,7 @@ import sys
 from pathlib import Path
 
 import pytest
+from support import ROOT
 
 from cavsumo.agents import observations
 from cavsumo.envs import ego_observations, ego_rewards, events, tester
@@ -19,7 +20,6 @@ from cavsumo.envs.puppets import PuppetEgo
 from cavsumo.model.bodies import CAR, PEDESTRIAN
 from cavsumo.simulation import rewards
 
-ROOT = Path(__file__).resolve().parents[1]
 PAGE = (ROOT / "docs" / "environments.md").read_text(encoding="utf-8")
 EXAMPLES = re.findall(r"```python\n(.*?)```", PAGE, re.DOTALL)
 

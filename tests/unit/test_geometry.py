@@ -2,13 +2,13 @@
 
 import json
 import math
-from pathlib import Path
 
 import pytest
 import shapely
 from hypothesis import assume, given
 from hypothesis import strategies as st
 from shapely.affinity import rotate, scale, translate
+from support import DATA
 
 from cavsumo.model.geometry import (
     Box,
@@ -23,8 +23,8 @@ from cavsumo.model.stopping_zones import (
     zone_polygons,
 )
 
-DATA = Path(__file__).parent / "data" / "assertion_vectors.json"
-ZONE_CASES = [c for c in json.loads(DATA.read_text())["cases"] if c["metric"] == "cavgym_zones"]
+CASES = json.loads((DATA / "assertion_vectors.json").read_text())["cases"]
+ZONE_CASES = [c for c in CASES if c["metric"] == "cavgym_zones"]
 VERDICTS = {
     "reaction": "interesting",
     "braking": "uninteresting_terminated",

@@ -11,12 +11,12 @@ import sys
 from pathlib import Path
 
 import pytest
+from support import ROOT
 
 from cavsumo.batch.preflight import Manner, checked
 from cavsumo.cli.command_line import _parser
 from cavsumo.cli.scenario_settings import parts_of
 
-ROOT = Path(__file__).resolve().parents[1]
 FILES = ("README.md", "docs/guide.md")
 README = "\n".join((ROOT / file).read_text(encoding="utf-8") for file in FILES)
 REPORTS = sorted(set(re.findall(r"^cavsumo report [^`\n]*", README, re.MULTILINE)))
@@ -58,9 +58,9 @@ def test_each_run_command_of_the_readme_runs(command: str, checkout: Path) -> No
     """Whatever the README tells the reader to type plays episodes."""
     words = shlex.split(command, comments=True)[1:]
     if "--scheduler" in words:
-        pytest.skip("there is no cluster of that name; tests/test_executors.py has one")
+        pytest.skip("there is no cluster of that name; test_executors.py has one")
     if "tcp:127.0.0.1:5000" in words:
-        pytest.skip("nobody listens there; tests/test_external_egos.py has the server")
+        pytest.skip("nobody listens there; test_external_egos.py has the server")
     if not set(AGAIN) & set(words):
         words += ["--runs", "1", "-o", "readme.csv"]
     done = cavsumo(words, checkout)

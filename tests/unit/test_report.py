@@ -8,79 +8,22 @@ import itertools
 import json
 import math
 import xml.etree.ElementTree as ET
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import Any
 
 import pytest
+from report_files import ERROR, FAILED, HELD, JUDGED, NOTHING, SOME, UNFAIR, write
 
 from cavsumo.cli import main
 from cavsumo.errors import InputError
-from cavsumo.model.seeds import episode_seed
 from cavsumo.report.analysis import Report, analyse
 from cavsumo.report.events import side_ahead, side_hit
 from cavsumo.report.formats import FORMATS
 from cavsumo.results.columns import COLUMNS
-from cavsumo.results.reading import FORMAT, HEADER, read_rows
-from cavsumo.results.rows import row_line
+from cavsumo.results.reading import read_rows
 from cavsumo.results.traces import read_moments, read_trace, trace_text
 
 Says = Callable[..., str]
-Row = dict[str, Any]
-HELD, FAILED, UNFAIR, NOTHING, ERROR = "held", "violated", "unfair", "not_triggered", "error"
-
-
-def plan(**settings: Any) -> dict[str, Any]:
-    """A plan as a manifest has it."""
-    own = {"agents": ["random", "timing"], "runs": 4, "seed": 1}
-    own |= {k: v for k, v in settings.items() if k in (*own, "first", "until_tests", "params")}
-    scenario = {k: v for k, v in settings.items() if k not in own}
-    return {"scenario": {"net": "gone/place.net.xml", **scenario}, **own}
-
-
-def write(
-    file: Path,
-    outcomes: Sequence[Sequence[str | Mapping[str, Any]]],
-    status: str = "finished",
-    **settings: Any,
-) -> Path:
-    """A batch whose episodes came out like this: for each seed one outcome an agent."""
-    own = plan(**{"runs": len(outcomes), **settings})
-    lines = [HEADER]
-    for episode, row in enumerate(outcomes):
-        for which, outcome in enumerate(row):
-            run = episode * len(own["agents"]) + which
-            lines.append(row_line(made(run, own, outcome, episode_seed(own["seed"], episode))))
-    file.write_text("".join(lines), encoding="utf-8")
-    manifest = {"format": FORMAT, "status": status, "plan": own, "stopped_by": None}
-    manifest |= {"versions": {}, "sha256": {}, "sumo_options": {}}
-    file.with_suffix(".json").write_text(json.dumps(manifest), encoding="utf-8")
-    return file
-
-
-def judged(avoidable: int, blame: str = "") -> Mapping[str, Any]:
-    """The cells of a failure that a reference driver was asked about."""
-    return {"outcome": FAILED, "avoidable": avoidable, "reference": "human", "blame": blame}
-
-
-def made(run: int, own: Mapping[str, Any], came: str | Mapping[str, Any], seed: int) -> Row:
-    """A row, by its outcome or with further cells."""
-    cells = {"outcome": came} if isinstance(came, str) else came
-    outcome = cells["outcome"]
-    agent = own["agents"][run % len(own["agents"])]
-    row = {"run": run, "agent": agent, "seed": seed, "wall_s": 0.5, **cells}
-    row |= {"ego": own["scenario"].get("ego", "sumo"), "testers": 3, "reset": "fresh"}
-    if outcome == ERROR:
-        return row | {"error": "SUMO crashed (SIGSEGV)"}
-    row |= {"time_s": 20.0 + run, "steps": 200}
-    if outcome in (HELD, FAILED):
-        row |= {"assertion": "reaction-zone", "tester": "tester0", "trigger_time_s": 4.0 + run}
-    if outcome == FAILED:
-        row |= {"violation_time_s": 5.0 + run, "impact_speed_mps": 3.0}
-    return row
-
-
-SOME = [(HELD, HELD), (NOTHING, FAILED), (UNFAIR, FAILED), (ERROR, HELD)]
 
 
 @pytest.fixture
@@ -196,13 +139,6 @@ def test_shares_by_hand(some: Report) -> None:
     assert (timing.tests.count, timing.tests.total) == (4, 4)
     assert timing.failures.value == 0.5
     assert list(timing.tests.intervals) == ["Wilson", "Clopper-Pearson"]
-
-
-JUDGED = [
-    [{"outcome": "invalid", "breach": "tester0 left the world at 3.0 s"}, judged(1)],
-    [judged(1, "ego:speed"), judged(0, "tester:stepped-out")],
-    [judged(1, "ego:speed"), FAILED],
-]
 
 
 def test_what_could_have_been_avoided_and_who_is_to_blame(tmp_path: Path, says: Says) -> None:

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from test_report import ERROR, FAILED, HELD, JUDGED, NOTHING, SOME, UNFAIR, write
+from report_files import ERROR, FAILED, HELD, JUDGED, NOTHING, SOME, UNFAIR, write
 
 from cavsumo.cli import main
 from cavsumo.errors import InputError

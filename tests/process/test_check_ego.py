@@ -10,7 +10,7 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
-from support import serving
+from support import ROOT, serving
 
 from cavsumo.cli.command_line import main
 from cavsumo.egos import EGOS, Acceleration, Command, Ego
@@ -19,7 +19,6 @@ from cavsumo.model.snapshot import Snapshot
 from cavsumo.testing import ego_checks
 from cavsumo.testing.scripts import EMPTY, drive, ground
 
-ROOT = Path(__file__).parents[1]
 EXAMPLES = ROOT / "examples" / "egos"
 PYTHON_EXAMPLE = EXAMPLES / "stop_for_pedestrians.py"
 BLOCK = re.compile(r"```python\n(.*?)```", re.DOTALL)

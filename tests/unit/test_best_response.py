@@ -13,6 +13,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from support import STRAIGHT_NET
 
 from cavsumo.agents import AGENTS
 from cavsumo.agents.planning import response, solving
@@ -32,7 +33,6 @@ from cavsumo.agents.planning.response import (
 )
 from cavsumo.agents.planning.solving import best_response, chain, layer, roll_out, unsolved
 from cavsumo.errors import InputError
-from tests.support import STRAIGHT_NET
 
 DT = 0.1
 

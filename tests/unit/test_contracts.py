@@ -6,10 +6,10 @@ import dataclasses
 import math
 import random
 from collections.abc import Callable, Mapping, Sequence
-from pathlib import Path
 from typing import Any, ClassVar
 
 import pytest
+from support import ROOT
 
 from cavsumo.agents import AGENTS, Agent
 from cavsumo.agents.base import NoopAgent
@@ -36,7 +36,7 @@ from cavsumo.testing import (
 )
 from cavsumo.testing.scripts import ground
 
-NET = Path(__file__).parents[1] / "networks" / "pedestrians.net.xml"
+NET = ROOT / "networks" / "pedestrians.net.xml"
 
 
 @pytest.mark.parametrize("name", list(EGOS))

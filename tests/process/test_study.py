@@ -11,7 +11,7 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 
 import pytest
-from support import PATIENCE_S, content, rows, until
+from support import PATIENCE_S, ROOT, content, rows, until
 
 from cavsumo.batch.prepared import prepare
 from cavsumo.batch.summary import interval
@@ -22,7 +22,6 @@ from cavsumo.model.study import Choice, Part, overruled, product, read_study
 from cavsumo.results.reading import read_manifest
 from cavsumo.results.statistics import rate
 
-ROOT = Path(__file__).parents[1]
 Write = Callable[[str], Path]
 
 # Two agents, one of them learning, on an empty road: two batches, quickly played.

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from support import rows, traces
+from support import ROOT, rows, traces
 
 from cavsumo.assertions import Assertion, make_assertions
 from cavsumo.cli import main
@@ -24,7 +24,7 @@ from cavsumo.testing import AssertionContract
 from cavsumo.testing.assertion_checks import encounter
 from cavsumo.testing.scripts import ground
 
-NET = Path(__file__).parents[1] / "networks" / "pedestrians.net.xml"
+NET = ROOT / "networks" / "pedestrians.net.xml"
 Writer = Callable[..., str]
 
 SOURCE = '''

@@ -20,7 +20,7 @@ from types import ModuleType
 from typing import Any
 
 import pytest
-from support import alive, rows, serving, traces, until, workers_of
+from support import ROOT, alive, rows, serving, traces, until, workers_of
 
 from cavsumo.agents.base import Scene
 from cavsumo.cli import main
@@ -31,7 +31,7 @@ from cavsumo.errors import EgoError
 from cavsumo.model.snapshot import Snapshot
 from cavsumo.results.reading import read_manifest
 
-EXAMPLES = Path(__file__).parents[1] / "examples" / "egos"
+EXAMPLES = ROOT / "examples" / "egos"
 CAREFUL = EXAMPLES / "stop_for_pedestrians.py"
 
 # Drives on, and at step 3 of an episode does what it was told to, or takes turns with what the file

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from support import benchmark
+from support import DATA, benchmark
 
 from cavsumo.games import (
     Game,
@@ -39,8 +39,7 @@ from cavsumo.games.components import end_components, gain
 from cavsumo.games.files import game_of
 from cavsumo.games.policies import EGO, ego_actions
 
-ROOT = Path(__file__).parents[1]
-VECTORS = json.loads((ROOT / "tests" / "data" / "ssp_games.json").read_text(encoding="utf-8"))
+VECTORS = json.loads((DATA / "ssp_games.json").read_text(encoding="utf-8"))
 CASES = {case["id"]: case for case in VECTORS["cases"]}
 LISTED = [name for name, case in CASES.items() if "transitions" in case]
 READINGS = list(Reading)

@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from support import ROOT
 
 from cavsumo.cli import main
 from cavsumo.model.polyline import Path as Polyline
@@ -143,7 +144,7 @@ def test_routes_along_zigzag_lanes_come_last(networks: dict[str, Path]) -> None:
 def test_json_has_the_documented_keys(networks: dict[str, Path], capsys: Capture) -> None:
     """The keys are those of docs/inspect.md; a change of them needs a new format."""
     found = _looked(capsys, str(networks["crossing"]), "--top", "2")
-    documented = (Path(__file__).parents[1] / "docs" / "inspect.md").read_text(encoding="utf-8")
+    documented = (ROOT / "docs" / "inspect.md").read_text(encoding="utf-8")
     assert set(found) == {"format", "network", "facts", "junctions"}
     assert found["format"] == 1
     assert [j["rank"] for j in found["junctions"]] == [1, 2]

@@ -2,12 +2,12 @@
 
 import json
 import math
-from pathlib import Path
 
 import numpy as np
 import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
+from support import DATA
 
 from cavsumo.errors import CavsumoError, NoSuchAction
 from cavsumo.model.kinematics import (
@@ -21,9 +21,7 @@ from cavsumo.model.kinematics import (
     wrap,
 )
 
-CASES = json.loads((Path(__file__).parent / "data" / "kinematics_vectors.json").read_text())[
-    "cases"
-]
+CASES = json.loads((DATA / "kinematics_vectors.json").read_text())["cases"]
 FORWARD = [c for c in CASES if c["kind"] == "forward"]
 INVERSE = [c for c in CASES if c["kind"] == "inverse"]
 CAR = {"wheelbase": 3.0, "v_min": 0.0, "v_max": 9.0, "dt": 0.1}

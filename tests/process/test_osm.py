@@ -12,6 +12,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
+from support import DATA
 
 from cavsumo.cli import main
 from cavsumo.errors import InputError
@@ -21,7 +22,7 @@ from cavsumo.network.osm.extract import find_roads, parse_box, read_items, write
 from cavsumo.network.osm.handedness import side, warning
 from cavsumo.network.reader import read_network
 
-CROSSROADS = Path(__file__).parent / "data" / "crossroads.osm"
+CROSSROADS = DATA / "crossroads.osm"
 WEST_HALF = "121.3970,31.1980,121.3989,31.2020"  # the junction without traffic lights
 
 needs_netconvert = pytest.mark.skipif(

@@ -5,12 +5,12 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Mapping, Sequence
-from pathlib import Path
 from typing import Any
 
 import pytest
 from hypothesis import assume, example, given, settings
 from hypothesis import strategies as st
+from support import DATA
 
 from cavsumo.agents.base import Scene
 from cavsumo.assertions import ASSERTIONS, Assertion
@@ -21,8 +21,8 @@ from cavsumo.model.kinematics import step_floats
 from cavsumo.model.polyline import Path as Polyline
 from cavsumo.model.snapshot import BodyState, Snapshot
 
-DATA = Path(__file__).parent / "data" / "assertion_vectors.json"
-ZONES = [c for c in json.loads(DATA.read_text())["cases"] if c["metric"] == "cavgym_zones"]
+CASES = json.loads((DATA / "assertion_vectors.json").read_text())["cases"]
+ZONES = [c for c in CASES if c["metric"] == "cavgym_zones"]
 VERDICTS = {"interesting": "held", "uninteresting_terminated": "unfair", "none": "not_triggered"}
 
 State = tuple[float, float, float, float]  # x, y, v, o

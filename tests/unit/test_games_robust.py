@@ -14,15 +14,14 @@ from typing import Any
 
 import numpy as np
 import pytest
-from support import benchmark
+from support import DATA, benchmark
 
 from cavsumo.games import Game, NotCertified, Unsolvable, compiled, holds, read_game, solve
 from cavsumo.games.build import from_arrays, from_transitions
 from cavsumo.games.files import game_of
 from cavsumo.games.segments import spans, starts
 
-ROOT = Path(__file__).parents[1]
-VECTORS = json.loads((ROOT / "tests" / "data" / "ssp_games.json").read_text(encoding="utf-8"))
+VECTORS = json.loads((DATA / "ssp_games.json").read_text(encoding="utf-8"))
 LISTED = [case for case in VECTORS["cases"] if "transitions" in case]
 STEPS = 400  # of a solution, counted by ``tell``, far above what was met
 Row = tuple[int, int, int, list[tuple[int, Any, float]]]

@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from support import rows
+from support import ROOT, rows
 
 from cavsumo.agents import Agent, Scene
 from cavsumo.agents.observations import VERSION, entries
@@ -27,7 +27,7 @@ from cavsumo.results.reading import read_manifest
 from cavsumo.testing import AgentContract
 
 NAMES = tuple(name for name, _, _ in entries(1, 1.4, 1.0))
-NET = Path(__file__).parents[1] / "networks" / "pedestrians.net.xml"
+NET = ROOT / "networks" / "pedestrians.net.xml"
 
 
 def header(**changed: Any) -> Header:

@@ -15,6 +15,7 @@ import shapely
 from hypothesis import given
 from hypothesis import strategies as st
 from shapely.geometry import LineString
+from support import ROOT
 
 from cavsumo.batch.replay import Record
 from cavsumo.errors import InputError
@@ -26,7 +27,6 @@ from cavsumo.report.pages.replay.packing import NOTHING, columns, packed, shapes
 from cavsumo.report.pages.replay.page import episode, page, write_page
 from cavsumo.results.traces import Shape, Trace
 
-ROOT = Path(__file__).parents[1]
 Shown = tuple[Record, Trace, Site]
 
 

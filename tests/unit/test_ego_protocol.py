@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from support import ROOT
 
 from cavsumo.agents.base import Scene
 from cavsumo.egos.base import EGO_KIND, Acceleration, Drive, Mission
@@ -22,7 +23,7 @@ from cavsumo.model.carriageway import Light
 from cavsumo.model.polyline import Path as Polyline
 from cavsumo.model.snapshot import Snapshot
 
-DOCS = Path(__file__).parents[1] / "docs" / "ego-protocol.md"
+DOCS = ROOT / "docs" / "ego-protocol.md"
 LIGHTS = (Light("J1", 2, 40.0), Light("J2", 0, 80.0))
 PATH = Polyline([(0.0, -1.825), (99.0, -1.825)])
 

@@ -10,14 +10,13 @@ from types import ModuleType
 
 import numpy as np
 import pytest
-from support import rows
+from support import ROOT, rows
 
 from cavsumo.agents.observations import entries
 from cavsumo.agents.policy_file import read_policy
 from cavsumo.cli import main
 from cavsumo.results.statistics import Rate, rate
 
-ROOT = Path(__file__).resolve().parents[1]
 EXAMPLE = ROOT / "examples" / "train_tester"
 TESTER = EXAMPLE / "tester.npz"
 

@@ -12,7 +12,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
-from support import content
+from support import ROOT, content
 
 from cavsumo.batch.replay import located, recorded_alone
 from cavsumo.cli import main
@@ -21,7 +21,6 @@ from cavsumo.model import named_networks
 from cavsumo.model.scenario import plan_from
 from cavsumo.model.scenario_file import read_config
 
-ROOT = Path(__file__).parents[1]
 FEW = ("--runs", "3", "--trace", "all", "--end", "12", "-q", "--exit-zero")
 
 

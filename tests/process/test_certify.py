@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from support import content, rows
+from support import ROOT, content, rows
 
 from cavsumo.batch.certify.certificate import as_json, certified, rounded_down, sentences
 from cavsumo.batch.certify.ego_list import opponents
@@ -34,7 +34,6 @@ from cavsumo.results.rows import row_line
 from cavsumo.results.statistics import lower_bound
 from cavsumo.results.traces import Trace, parsed
 
-ROOT = Path(__file__).parents[1]
 LEARNT = 5  # the third episode of the learner in the results
 # An ego that fails in every episode whose seed is odd.
 MOODY = """

@@ -4,20 +4,20 @@ from __future__ import annotations
 
 import json
 import math
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
+from support import DATA
 
 from cavsumo.assertions import metrics
 from cavsumo.assertions.metrics.encroachment import boxes_overlap
 from cavsumo.errors import InputError
 from cavsumo.model.geometry import Box, gap, overlap
 
-CASES = json.loads((Path(__file__).parent / "data" / "assertion_vectors.json").read_text())["cases"]
+CASES = json.loads((DATA / "assertion_vectors.json").read_text())["cases"]
 
 angles = st.floats(-math.pi, math.pi)
 near = st.floats(-20.0, 20.0)

@@ -10,13 +10,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from support import DATA, ROOT
 
 from cavsumo.cli import main
 
-ROOT = Path(__file__).parents[1]
 CASES = {
-    case["id"]: case
-    for case in json.loads((ROOT / "tests/data/ssp_games.json").read_text("utf-8"))["cases"]
+    case["id"]: case for case in json.loads((DATA / "ssp_games.json").read_text("utf-8"))["cases"]
 }
 KEYS = ("id", "n_states", "goal", "initial", "transitions")
 
