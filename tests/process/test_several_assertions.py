@@ -14,8 +14,9 @@ from cavsumo.cli import main
 from cavsumo.errors import InputError, UnknownName
 from cavsumo.model.scenario import plan_from
 from cavsumo.model.scenario_file import read_config
+from cavsumo.results.columns import verdicts_cell
 from cavsumo.results.reading import read_rows
-from cavsumo.results.rows import verdicts_cell, verdicts_of
+from cavsumo.results.rows import verdicts_of
 
 NAMES = ("reaction-zone", "stopping-distance", "speed-limit")
 

@@ -12,11 +12,11 @@ from shapely.geometry import Point
 from staging import Stage
 
 from cavsumo.assertions.blame import RULES
-from cavsumo.batch.episode_runner import measured
 from cavsumo.model.carriageway import Approach, Start
 from cavsumo.model.scenario import BatchPlan
 from cavsumo.model.snapshot import BodyState, Snapshot
 from cavsumo.network.site import Site
+from cavsumo.results.columns import measured
 
 Staged = Callable[..., tuple[BatchPlan, Site]]
 LEFT = math.pi / 2  # across the ego's way

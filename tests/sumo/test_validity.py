@@ -15,7 +15,6 @@ from cavsumo.assertions.base import Judgement
 from cavsumo.assertions.contacts import ContactMonitor, depth
 from cavsumo.assertions.naturalness import Naturalness
 from cavsumo.assertions.validity import STRAY_M, Breach, ValidityMonitor, possible
-from cavsumo.batch.episode_runner import measured
 from cavsumo.batch.tally import Tally
 from cavsumo.model.bodies import CAR, PEDESTRIAN, Body, Kind
 from cavsumo.model.carriageway import Roads, Start
@@ -27,6 +26,7 @@ from cavsumo.model.scene import Scene
 from cavsumo.model.snapshot import BodyState, Snapshot
 from cavsumo.network.site import Site
 from cavsumo.report.rates import rates
+from cavsumo.results.columns import measured
 from cavsumo.simulation.rewards import GOAL, RewardMonitor
 
 DT = 0.1

@@ -26,11 +26,11 @@ ROOMS = {
         "egos": "model agents assertions",
         "sumo": "model network egos",
         "simulation": "model network agents assertions egos sumo",
-        "results": "model network agents assertions egos sumo",
+        "results": "model network agents assertions egos sumo simulation",
         "batch": "model network agents assertions egos sumo simulation results",
         "report": "model network assertions egos results batch",
         "interop": "model network sumo results",
-        "envs": "model agents assertions egos simulation batch",
+        "envs": "model agents assertions egos simulation results batch",
         "testing": "model network agents assertions egos",
         "cli": "model games network agents assertions egos results batch report interop testing",
     }.items()

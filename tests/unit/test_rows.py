@@ -16,9 +16,9 @@ from hypothesis import strategies as st
 from cavsumo.errors import ResultsError
 from cavsumo.model.bodies import CAR, PEDESTRIAN, Body
 from cavsumo.model.snapshot import BodyState, Snapshot
-from cavsumo.results.columns import COLUMNS
+from cavsumo.results.columns import COLUMNS, Row
 from cavsumo.results.reading import FORMAT, read_manifest, read_results, read_rows
-from cavsumo.results.rows import Outcome, Row, cell
+from cavsumo.results.rows import Outcome, cell
 from cavsumo.results.traces import frame, read_trace, trace_head, trace_text
 from cavsumo.results.writing import Recorder
 
@@ -144,7 +144,7 @@ def test_the_manifest_says_running_until_it_says_finished(tmp_path: Path) -> Non
     done = read_manifest(file)
     assert (done["status"], done["episodes"], done["format"]) == ("finished", 1, FORMAT)
     assert done["plan"] == {"seed": 1}
-    assert done["columns"] == dict(COLUMNS)
+    assert done["columns"] == {c.name: c.explanation for c in COLUMNS.values()}
 
 
 def test_pandas_reads_numbers_as_numbers(tmp_path: Path) -> None:
