@@ -26,7 +26,7 @@ ROOMS = {
         "egos": "model agents assertions",
         "sumo": "model network egos",
         "simulation": "model network agents assertions egos sumo",
-        "results": "model network agents assertions egos sumo",
+        "results": "model network assertions egos sumo",
         "batch": "model network agents assertions egos sumo simulation results",
         "report": "model network assertions egos results batch",
         "interop": "model network sumo results",
