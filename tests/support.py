@@ -13,7 +13,11 @@ from concurrent.futures import Executor, Future
 from pathlib import Path
 from typing import Any
 
+from cavsumo.agents.casting import resolve_cast
 from cavsumo.batch.prepared import PreparedBatch
+from cavsumo.model.scenario import BatchPlan
+from cavsumo.network.site import Site
+from cavsumo.results.provenance import checksums, versions
 from cavsumo.results.reading import read_rows
 
 ROOT = Path(__file__).parents[1]  # the repository
@@ -28,6 +32,13 @@ LAPTOP, PHONE = {"width": 1280, "height": 800}, {"width": 390, "height": 844}
 # Settings of a short environment on the straight road.
 STRAIGHT_NET = str(ROOT / "networks" / "pedestrians.net.xml")
 SHORT = {"net": STRAIGHT_NET, "routes": "none", "end": 6.0}
+
+
+def prepared_at(plan: BatchPlan, site: Site) -> PreparedBatch:
+    """All that a process needs to play a plan at a site that is known."""
+    cast = resolve_cast(plan)
+    inputs = checksums(plan.scenario, cast.files)
+    return PreparedBatch(plan, cast, site, str(Path.cwd()), inputs, versions())
 
 
 def benchmark(name: str) -> Any:

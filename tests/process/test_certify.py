@@ -89,7 +89,7 @@ def traced(plan: BatchPlan, run: int, seed: int | None = None) -> Trace:
     again = dataclasses.replace(job(plan, run), record=True)
     if seed is not None:
         again = dataclasses.replace(again, seed=seed)
-    with EpisodeRunner(plan, prepare(plan).site) as runner:
+    with EpisodeRunner(prepare(plan)) as runner:
         return parsed(runner.play(again)[0].trace)
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import os
 import shutil
 import signal
@@ -296,13 +297,7 @@ def test_a_process_that_sees_other_files_says_which(copied: PreparedBatch) -> No
 
 def test_a_process_with_another_version_says_which(prepared: PreparedBatch) -> None:
     """On a machine with another SUMO nothing is played."""
-    other = PreparedBatch(
-        prepared.plan,
-        prepared.site,
-        prepared.folder,
-        prepared.checksums,
-        {**prepared.versions, "libsumo": "1.0.0"},
-    )
+    other = dataclasses.replace(prepared, versions={**prepared.versions, "libsumo": "1.0.0"})
     with pytest.raises(InputError, match=r"libsumo is .* expected 1\.0\.0"), Worker(other):
         pytest.fail("it started")
 
@@ -310,9 +305,7 @@ def test_a_process_with_another_version_says_which(prepared: PreparedBatch) -> N
 def test_a_folder_that_is_gone_is_one_sentence(prepared: PreparedBatch, tmp_path: Path) -> None:
     """The working folder of the batch is not there on this machine: named."""
     folder = str(tmp_path / "elsewhere")
-    other = PreparedBatch(
-        prepared.plan, prepared.site, folder, prepared.checksums, prepared.versions
-    )
+    other = dataclasses.replace(prepared, folder=folder)
     with pytest.raises(InputError, match="elsewhere"), Worker(other):
         pytest.fail("it started")
 

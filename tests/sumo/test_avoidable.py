@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from support import rows
+from support import prepared_at, rows
 
 from cavsumo.agents.base import Agent
 from cavsumo.assertions.contacts import Contact
@@ -419,11 +419,11 @@ def test_no_reference_leaves_the_rest_of_the_row_as_it_is(
     """The judgement costs nothing when it is off and changes nothing when it is on."""
     plan, site = staged("pedestrians", **{**BATCH, "reference": "none", "trace": trace})
     number = int(next(row for row in rows(batch) if row["avoidable"])["run"])
-    with EpisodeRunner(plan, site) as runner:
+    with EpisodeRunner(prepared_at(plan, site)) as runner:
         without = runner.play(job(plan, number))[0]
     beats: list[int] = []
     plan = plan.model_copy(update={"reference": "ideal"})
-    with EpisodeRunner(plan, site) as runner:
+    with EpisodeRunner(prepared_at(plan, site)) as runner:
         with_it = runner.play(job(plan, number), lambda: beats.append(1))[0]
     for name in ("avoidable", "reference", "last_chance_s", "margin_s", "avoidable_note", "wall_s"):
         with_it.row.pop(name, None)
@@ -471,7 +471,7 @@ def test_a_program_is_relieved_too(staged: Staged, tmp_path: Path) -> None:
     (tmp_path / "blind.py").write_text(BLIND, encoding="utf-8")
     ego = f"exec:{sys.executable} {tmp_path / 'blind.py'}"
     plan, site = staged("pedestrians", **{**BATCH, "ego": ego, "ego_params": {"depart_speed": 7}})
-    with EpisodeRunner(plan, site) as runner:
+    with EpisodeRunner(prepared_at(plan, site)) as runner:
         runner.try_out()
         outcome = runner.play(job(plan, 0))[0]
     assert outcome.row["outcome"] == "violated", outcome.row.get("error")

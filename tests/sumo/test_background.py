@@ -11,6 +11,7 @@ from typing import Any
 
 import libsumo
 import pytest
+from support import prepared_at
 
 from cavsumo.agents.programmed import TimingAgent
 from cavsumo.batch.episode_runner import EpisodeRunner
@@ -137,11 +138,11 @@ def test_a_jump_that_no_bound_foresaw_is_said() -> None:
 def episodes(staged: Staged, name: str, agent: str, **settings: Any) -> Iterator[Episode]:
     """A few episodes, each as it is played and as it is recorded."""
     plan, site = staged(name, agents=(agent,), routes="auto", **settings)
-    with EpisodeRunner(plan, site) as runner:
+    with EpisodeRunner(prepared_at(plan, site)) as runner:
         for run in range(6):
             one = job(plan, run)
             for record in (False, True):
-                yield play(runner.setup, runner._cast(one), one.seed, record=record)
+                yield play(runner.setup, runner.agents_of(one), one.seed, record=record)
 
 
 @pytest.mark.parametrize(
@@ -179,7 +180,7 @@ def test_whoever_is_left_out_of_a_snapshot_touches_nobody(staged: Staged, name: 
     """Every background body is read from SUMO beside the world; the boxes say who may be left."""
     plan, site = staged(name, routes="auto")
     skipped = 0
-    with EpisodeRunner(plan, site) as runner:
+    with EpisodeRunner(prepared_at(plan, site)) as runner:
         world, one = runner.setup.world, job(plan, 0)
         inner = world._snapshot
 
@@ -196,7 +197,7 @@ def test_whoever_is_left_out_of_a_snapshot_touches_nobody(staged: Staged, name: 
             return snapshot
 
         world._snapshot = checked  # type: ignore[method-assign]
-        play(runner.setup, runner._cast(one), one.seed)
+        play(runner.setup, runner.agents_of(one), one.seed)
     assert skipped
 
 
@@ -233,6 +234,6 @@ class Looking(TimingAgent):
 def test_whoever_looks_sees_everybody(staged: Staged) -> None:
     """One agent that looks is enough for the whole background to be read."""
     plan, site = staged("crossing", routes="auto")
-    with EpisodeRunner(plan, site) as runner:
+    with EpisodeRunner(prepared_at(plan, site)) as runner:
         play(runner.setup, [Looking() for _ in runner.setup.teams], 1)
     assert Looking.seen > 5

@@ -142,7 +142,7 @@ def test_a_tester_moved_from_outside_gives_the_row_of_a_batch(
     """The starts, and with an agent's actions every column, are those of ``cavsumo run``."""
     prepared = set_up("pedestrians", bodies_per_agent=3, trace="none", agents=("timing",), end=20.0)
     seed = 6
-    with EpisodeRunner(prepared.plan, prepared.site) as runner:
+    with EpisodeRunner(prepared) as runner:
         row = runner.play(Job(0, "timing", seed))[0].row
         noted = _tester_actions(runner, seed)
     env = make(until="verdict", end=20.0)
@@ -188,7 +188,7 @@ def test_an_ego_driven_from_outside_gives_the_row_of_a_batch(
         noted.append([command.value / 9.0])
         return command
 
-    with EpisodeRunner(prepared.plan, prepared.site) as runner:
+    with EpisodeRunner(prepared) as runner:
         row = runner.play(Job(0, "proximity", seed))[0].row
     ego.act = noting  # type: ignore[method-assign]
     setup = make_setup(prepared.plan.scenario, prepared.site, ego)

@@ -7,10 +7,10 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from support import rows, traces
+from support import prepared_at, rows, traces
 
 from cavsumo.agents import AGENTS, Agent
-from cavsumo.agents.casting import make_agents
+from cavsumo.agents.casting import resolve_cast
 from cavsumo.batch.episode_runner import EpisodeRunner
 from cavsumo.batch.jobs import job
 from cavsumo.cli import main
@@ -54,7 +54,7 @@ def words(option: str, sensor: dict[str, Any]) -> list[str]:
 
 def outcomes(plan: BatchPlan, site: Site) -> list[str]:
     """Of a batch, played in this process; an error says what it was."""
-    with EpisodeRunner(plan, site) as runner:
+    with EpisodeRunner(prepared_at(plan, site)) as runner:
         found = [runner.play(job(plan, run))[0].row for run in range(plan.runs)]
     return [row.get("error") or row["outcome"] for row in found]
 
@@ -80,7 +80,7 @@ def test_who_does_not_look_is_not_changed(staged: Staged, where: str) -> None:
         plan, site = staged("crossing", **settings, **sensor)
         setup = make_setup(plan.scenario, site)
         try:
-            episode = play(setup, make_agents(plan, "random"), 5, record=True)
+            episode = play(setup, resolve_cast(plan).agents("random"), 5, record=True)
         finally:
             setup.close()
         frames.append(list(map(frame, episode.frames)))

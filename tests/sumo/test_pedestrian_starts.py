@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 import shapely
 from shapely.geometry import LineString, Polygon
+from support import prepared_at
 
 from cavsumo.batch.episode_runner import EpisodeRunner
 from cavsumo.batch.jobs import job
@@ -289,10 +290,10 @@ def test_nobody_starts_in_a_car_that_stands_in_sumo(staged: Staged, tmp_path: Pa
     axis = Polyline(lane_shape(lane))
     area = StartingArea(axis, 40.0, 58.0, 3.0, ())
     moved = 0
-    with EpisodeRunner(plan, dataclasses.replace(site, areas=(area,))) as runner:
+    with EpisodeRunner(prepared_at(plan, dataclasses.replace(site, areas=(area,)))) as runner:
         for run in range(plan.runs):
             one = job(plan, run)
-            first = EpisodeLoop(runner.setup, runner._cast(one), one.seed, record=True)
+            first = EpisodeLoop(runner.setup, runner.agents_of(one), one.seed, record=True)
             (car,) = first.snapshot.background
             rooms = [room(s, PEDESTRIAN) for s in first.scene.starts]
             assert all(is_clear(box, [car.box]) for box in rooms)

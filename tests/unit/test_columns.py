@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import pytest
+from support import ROOT
 
 from cavsumo.assertions.base import Judgement
 from cavsumo.batch.jobs import Job, finished
@@ -12,7 +11,6 @@ from cavsumo.model.scenario import BatchPlan, plan_from
 from cavsumo.results.columns import COLUMNS, markdown_table, measured, row_of
 from cavsumo.simulation.loop import Episode
 
-ROOT = Path(__file__).parents[1]
 UNITS = {"s": "s", "m": "m", "mps": "m/s", "mps2": "m/s²", "rad": "rad"}
 
 
