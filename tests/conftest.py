@@ -248,7 +248,7 @@ def shown(staged: Callable[..., tuple[BatchPlan, Site]]) -> tuple[Record, Trace,
     """An episode at the Helsinki crossing in which the ego hits a tester, recorded."""
     plan, site = staged("crossing", agents=["timing"], routes="auto")
     with EpisodeRunner(prepared_at(plan, site)) as runner:
-        outcome, _ = runner.play(dataclasses.replace(job(plan, 1), record=True))
+        outcome = runner.play(dataclasses.replace(job(plan, 1), record=True)).outcome
     trace = parsed(outcome.trace)
     return Record(plan, trace.row, trace, trace.head, Path("results.csv")), trace, site
 

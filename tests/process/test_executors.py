@@ -55,7 +55,7 @@ def quiet(prepared: PreparedBatch) -> list[Any]:
 def played(prepared: PreparedBatch, executor: Executor) -> list[Any]:
     """What comes out of an executor: rows, traces and what was learned, in order."""
     batch = run_batch(prepared, executor, prepared.plan.todo())
-    return [(lasting(outcome), memory) for outcome, memory in batch]
+    return [(lasting(answer.outcome), answer.memory) for answer in batch]
 
 
 def quiet_rows(quiet: list[Any], upto: int | None = None) -> list[tuple[str, str, str]]:
