@@ -20,7 +20,8 @@ import pytest
 from cavsumo.batch import worker as workers
 from cavsumo.batch.episode_runner import EpisodeRunner
 from cavsumo.batch.jobs import Job
-from cavsumo.batch.worker import Answer, Worker
+from cavsumo.batch.messages import Answer
+from cavsumo.batch.worker import Worker
 from cavsumo.cli import main
 from cavsumo.errors import BatchError, CavsumoError, InputError
 
@@ -50,7 +51,7 @@ def _start(self: Worker) -> None:
         prepared = self.prepared
         try:
             prepared.check_here()
-            runner = EpisodeRunner(prepared.plan, prepared.site, prepared.checksums)
+            runner = EpisodeRunner(prepared)
             _RUNNERS[self] = runner
             workers._WORKERS.add(self)
             runner.try_out()

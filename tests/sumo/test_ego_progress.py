@@ -8,8 +8,7 @@ from collections.abc import Callable
 import pytest
 from staging import Stage
 
-from cavsumo.agents.base import Agent
-from cavsumo.agents.casting import make_agents
+from cavsumo.agents.casting import resolve_cast
 from cavsumo.model.carriageway import Limit
 from cavsumo.model.scenario import BatchPlan
 from cavsumo.model.snapshot import Snapshot
@@ -77,7 +76,7 @@ def test_a_plain_driver_alone_loses_next_to_nothing(staged: Staged, network: str
         network, agents=["noop"], testers=1, ego_params={"actionStepLength": 0, "sigma": 0}
     )
     setup = make_setup(plan.scenario, site)
-    agents: list[Agent] = make_agents(plan, "noop")
+    agents = resolve_cast(plan).agents("noop")
     try:
         row = measured(play(setup, agents, 1))
     finally:
