@@ -166,6 +166,7 @@ REFUSED = [
     (f"{ROAD} --ego constnat", "did you mean 'constant'?"),
     (f"{ROAD} --param ain=0.5", "did you mean 'aim'?"),
     (f"{ROAD} --param aim", "expected KEY=VALUE, got 'aim'"),
+    (f"{ROAD} --kind car --agent q-learning", "can only walk"),
     (f"{ROAD} --testers 0", "testers"),
     (f"{ROAD} --runs 0", "runs"),
     (f"{ROAD} --end nan", "end"),
