@@ -22,3 +22,8 @@ ASSERTION_NAMES = Names(
         "two-second-gap": "two_second_gap",
     },
 )
+
+
+def is_formula(name: str) -> bool:
+    """Whether this is a formula in place of the name of one."""
+    return bool(set("<>=() ") & set(name))

@@ -17,6 +17,7 @@ from cavsumo.agents.casting import check_agents, learners, make_agents
 from cavsumo.agents.manoeuvres import types_for
 from cavsumo.agents.policy import policy_file
 from cavsumo.assertions import make_assertions
+from cavsumo.batch.plan_names import check_names
 from cavsumo.egos import make_ego
 from cavsumo.egos.base import Ego
 from cavsumo.egos.ego_files import data_files, machine
@@ -88,6 +89,7 @@ def prepare(plan: BatchPlan, ego: Ego | None = None) -> PreparedBatch:
     ``ego`` drives instead of the one that the plan names.
     """
     scenario = plan.scenario
+    check_names(plan)
     check_agents(plan)
     for label in plan.cast:
         make_agents(plan, label)[0].prepare()

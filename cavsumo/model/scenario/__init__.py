@@ -14,6 +14,7 @@ from cavsumo.model.scenario.parsing import (
     plan_from,
 )
 from cavsumo.model.scenario.plan import (
+    NO_REFERENCE,
     SHARED_BY,
     BatchPlan,
     Simulation,
@@ -23,6 +24,7 @@ from cavsumo.model.scenario.plan import (
 from cavsumo.model.scenario.record import Scenario
 
 __all__ = [
+    "NO_REFERENCE",
     "PLAN_KEYS",
     "SCENARIO_KEYS",
     "SENSOR_KEYS",

@@ -31,19 +31,19 @@ class BatchPlan(BaseModel):
         description="the driver who takes over to see whether a violation was avoidable; human is "
         "careful and competent (UN R157), none leaves it out",
     )
-    agents: Annotated[tuple[str, ...], Option("agents", ("--agent",), "NAME", choices="agent")] = (
-        Field(
-            ("timing",),
-            min_length=1,
-            description="a tester agent by name (cavsumo agents) or policy:FILE; several are "
-            "compared; LABEL=NAME for one with parameters of its own",
-        )
+    agents: Annotated[
+        tuple[str, ...], Option("tester agents", ("--agent",), "NAME", choices="agent")
+    ] = Field(
+        ("timing",),
+        min_length=1,
+        description="a tester agent by name (cavsumo agents) or policy:FILE; several are "
+        "compared; LABEL=NAME for one with parameters of its own",
     )
-    params: Annotated[Params, Option("agents", ("--param",), "KEY=VALUE", environments=True)] = (
-        Field(
-            default_factory=dict,
-            description="a parameter of the agents that have it; NAME.KEY or LABEL.KEY for one",
-        )
+    params: Annotated[
+        Params, Option("tester agents", ("--param",), "KEY=VALUE", environments=True)
+    ] = Field(
+        default_factory=dict,
+        description="a parameter of the agents that have it; NAME.KEY or LABEL.KEY for one",
     )
     known: dict[str, tuple[Any, ...]] | None = Field(
         None,
