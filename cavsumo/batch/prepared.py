@@ -18,6 +18,7 @@ import numpy as np
 from cavsumo.agents.casting import Cast, resolve_cast
 from cavsumo.agents.manoeuvres import types_for
 from cavsumo.assertions import make_assertions
+from cavsumo.batch.plan_names import check_names
 from cavsumo.egos import make_ego
 from cavsumo.egos.base import Ego
 from cavsumo.egos.ego_files import data_files, machine
@@ -105,6 +106,7 @@ def prepare(plan: BatchPlan, ego: Ego | None = None) -> PreparedBatch:
     ``ego`` drives instead of the one that the plan names.
     """
     scenario = plan.scenario
+    check_names(plan)
     cast = resolve_cast(plan)
     for member in cast:
         member.make().prepare()

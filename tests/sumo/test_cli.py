@@ -157,7 +157,7 @@ def test_the_weights_of_one_batch_begin_the_next(town: Path) -> None:
 
 ROAD = "run -n town.net.xml"
 REFUSED = [
-    ("", "arguments are required"),
+    ("game", "arguments are required"),
     ("run -n nowhere.net.xml", "no such file; '.' holds bare.net.xml"),
     ("run -n text.net.xml", "not well-formed XML"),
     ("run -n folder.net.xml", "folder.net.xml"),
