@@ -30,6 +30,7 @@ ROOMS = {
         "batch": "model network agents assertions egos sumo simulation results",
         "report": "model network assertions egos results batch",
         "interop": "model network sumo results",
+        "api": "model network batch report results",
         "envs": "model agents assertions egos simulation batch",
         "testing": "model network agents assertions egos",
         "cli": "model games network agents assertions egos results batch report interop testing",

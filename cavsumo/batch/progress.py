@@ -1,4 +1,4 @@
-"""Progress on stderr: a bar on a terminal, a plain line every tenth elsewhere."""
+"""Progress: a bar in a notebook or on a terminal's stderr, a plain line every tenth elsewhere."""
 
 from __future__ import annotations
 
@@ -71,3 +71,15 @@ def _duration(seconds: float) -> str:
     minutes, s = divmod(round(seconds), 60)
     hours, m = divmod(minutes, 60)
     return f"{hours}:{m:02}:{s:02}" if hours else f"{m}:{s:02}"
+
+
+def is_shown() -> bool:
+    """Whether there is a bar: somebody looks at a terminal or at a notebook."""
+    return sys.stderr.isatty() or in_notebook()
+
+
+def in_notebook() -> bool:
+    """Whether this process is the kernel of a notebook."""
+    loaded = sys.modules.get("IPython")
+    shell = loaded.get_ipython() if loaded else None
+    return getattr(shell, "kernel", None) is not None

@@ -18,6 +18,11 @@ FORMAT = "cavsumo-results-1"
 STARTING = "starting"  # a manifest that says so owns none of the rows that lie beside it
 COMPLETE = ("finished", "stopped", STARTING)  # the statuses of which no row would be missed
 HEADER = ",".join(COLUMNS) + "\n"
+# Columns that hold words; all others hold numbers.
+WORDS = frozenset(
+    "agent ego reset embodiment forecast outcome breach blame assertion verdicts tester reference "
+    "avoidable_note trace error".split()
+)
 
 
 def trace_name(csv_file: Path, run: int) -> str:
@@ -133,10 +138,30 @@ def _parsed(line: bytes, place: str) -> dict[str, str]:
 
 
 def read_results(csv_file: Path) -> pandas.DataFrame:
-    """The rows as a pandas table, numbers as numbers."""
+    """The rows as a pandas table: numbers as numbers, NaN for what is missing.
+
+    A torn last line is left out. Raises ResultsError for any other damage, and for a cell that is
+    no number where one is expected.
+    """
     import pandas
 
-    try:
-        return pandas.read_csv(csv_file)
-    except (OSError, ValueError) as error:
-        raise ResultsError(f"results {str(csv_file)!r}: cannot be read: {error}") from error
+    rows = [row for _, row in whole_lines(csv_file) if row is not None]
+    texts = pandas.DataFrame(rows, columns=list(COLUMNS), dtype="object")
+    return pandas.DataFrame({name: _values(texts[name], csv_file) for name in COLUMNS})
+
+
+def _values(texts: pandas.Series, csv_file: Path) -> pandas.Series:
+    """The values of a column, which stand there as text."""
+    import pandas
+
+    found = texts.where(texts != "")
+    if texts.name in WORDS:
+        return found
+    numbers = pandas.to_numeric(found, errors="coerce")
+    wrong = texts[numbers.isna() & found.notna()]
+    if len(wrong):
+        raise ResultsError(
+            f"results {str(csv_file)!r}: line {wrong.index[0] + 2}: {texts.name} is "
+            f"{wrong.iloc[0]!r}, expected a number"
+        )
+    return numbers
