@@ -8,6 +8,8 @@ from cavsumo.agents import AGENTS, Agent
 from cavsumo.agents.policy import make_agent, parameters_of, policy_file
 from cavsumo.errors import InputError, UnknownName
 from cavsumo.model.bodies import Body, kind_named, model_of
+from cavsumo.model.objects import is_object
+from cavsumo.model.plugins import source_file
 from cavsumo.model.scenario import BatchPlan, Scenario
 
 
@@ -24,6 +26,9 @@ def agent_files(plan: BatchPlan) -> list[Path]:
     for label, name in plan.cast.items():
         if (file := policy_file(name)) is not None:
             files.append(file)
+            continue
+        if is_object(name):
+            files += filter(None, [source_file(name)])
             continue
         params = plan.agent_params(label, [p.name for p in parameters_of(name)])
         files += [

@@ -16,6 +16,7 @@ from cavsumo.batch.replay import located, recorded_plan
 from cavsumo.batch.replay import recorded as find_recorded
 from cavsumo.batch.tally import Tally
 from cavsumo.errors import InputError
+from cavsumo.model.objects import SentObject
 from cavsumo.model.own_folders import OwnFolder
 from cavsumo.model.scenario import BatchPlan, Scenario
 from cavsumo.report.files import ReportOptions, write_report_files
@@ -53,11 +54,14 @@ class Results:
         file: the results file.
         trusted: whether a replay may use egos and assertions that only the file names.
         folder: the temporary folder in which the file lies; None for results with a place.
+        objects: the agents, the ego and the assertions that were given as objects; a replay uses
+            them.
     """
 
     file: Path
     trusted: bool = False
     folder: TemporaryFolder | None = None
+    objects: tuple[SentObject, ...] = ()
 
     @cached_property
     def rows(self) -> pandas.DataFrame:

@@ -61,7 +61,7 @@ def run(
         BatchError: the batch cannot go on, as for a full disk.
         KeyboardInterrupt: somebody stopped it; what ran is in ``output``.
     """
-    given = settings_of(net, settings)
+    given, objects = settings_of(net, settings)
     if config is not None:
         given = overruled(read_config(Path(config)), given)
     manner = Manner(resume, retry_errors, overwrite, quiet=not (progress and is_shown()))
@@ -70,14 +70,14 @@ def run(
         raise InputError("run: resume and retry_errors go on with an output; none is given")
     if output is not None:
         _play(given, Path(output), means, manner)
-        return Results(Path(output), trusted=True)
+        return Results(Path(output), trusted=True, objects=tuple(objects))
     folder = TemporaryFolder()
     try:
         _play(given, folder.path / FILE, means, manner)
     except BaseException:
         folder.close()
         raise
-    return Results(folder.path / FILE, trusted=True, folder=folder)
+    return Results(folder.path / FILE, trusted=True, folder=folder, objects=tuple(objects))
 
 
 def _means(jobs: int | None, executor: Any, scheduler: str | None) -> Means:

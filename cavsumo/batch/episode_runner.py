@@ -13,6 +13,7 @@ from cavsumo.assertions.base import INVALID, VIOLATED, Judgement
 from cavsumo.batch.jobs import Job, failed_row, head
 from cavsumo.egos.reference import REFERENCES
 from cavsumo.errors import CavsumoError, EgoError
+from cavsumo.model.objects import is_instance
 from cavsumo.model.scenario import BatchPlan, Simulation
 from cavsumo.model.seeds import episode_seed
 from cavsumo.network.site import Site
@@ -108,8 +109,8 @@ class EpisodeRunner:
         }
 
     def _cast(self, job: Job) -> list[Agent]:
-        """The agents of a job, with their memory."""
-        if job.agent not in self._agents:
+        """The agents of a job, with their memory; of an object, fresh copies."""
+        if job.agent not in self._agents or is_instance(self.plan.cast[job.agent]):
             agents = make_agents(self.plan, job.agent)
             self._agents[job.agent] = agents, _recall(agents)
         agents, unlearned = self._agents[job.agent]

@@ -22,6 +22,7 @@ from cavsumo.egos.base import Ego
 from cavsumo.egos.ego_files import data_files, machine
 from cavsumo.errors import InputError
 from cavsumo.model.bodies import WALKING, Kind, kind_named
+from cavsumo.model.objects import SentObject, is_here, is_object, objects_among
 from cavsumo.model.scenario import BatchPlan
 from cavsumo.network.site import Site, Wishes, derive_site
 from cavsumo.network.traffic import Volume
@@ -43,6 +44,7 @@ class PreparedBatch:
         checksums: of the plan's files, so that a process elsewhere notices other ones.
         versions: of what the results depend on.
         machine: that on which it was prepared; files that an ego writes differ on others.
+        objects: the agents, the ego and the assertions that are objects of a Python session.
         key: stands for all of it.
     """
 
@@ -52,6 +54,7 @@ class PreparedBatch:
     checksums: Mapping[str, str]
     versions: Mapping[str, str]
     machine: str = field(default_factory=machine)
+    objects: tuple[SentObject, ...] = ()
     key: str = field(init=False)
 
     def __post_init__(self) -> None:
@@ -116,7 +119,8 @@ def prepare(plan: BatchPlan, ego: Ego | None = None) -> PreparedBatch:
     if site.approaches:  # that there is room for them must not come out an episode at a time
         kinds, rng = [kind] * scenario.testers, np.random.default_rng(plan.seed)
         site.draw(kinds, ego.kind, scenario.start_speed, rng)
-    return PreparedBatch(plan, site, str(Path.cwd()), checksums(plan), versions())
+    objects = objects_among([*plan.cast.values(), scenario.ego, *scenario.assertions])
+    return PreparedBatch(plan, site, str(Path.cwd()), checksums(plan), versions(), objects=objects)
 
 
 def wishes(plan: BatchPlan, kind: Kind, ego: Ego) -> Wishes:
@@ -169,11 +173,16 @@ def approach_types(plan: BatchPlan, kind: Kind) -> tuple[str, ...]:
     if plan.scenario.approaches or kind.name in WALKING:
         return plan.scenario.approaches
     agents = [
-        None if policy_file(name) else make_agents(plan, label)[0]
+        None if policy_file(name) or _is_missing(name) else make_agents(plan, label)[0]
         for label, name in plan.cast.items()
     ]
     names = {getattr(agent, "manoeuvre", "auto") for agent in agents}
     return types_for(names.pop()) if len(names) == 1 else ()
+
+
+def _is_missing(name: str) -> bool:
+    """Whether an agent is an object that is not here: its episodes can still be shown."""
+    return is_object(name) and not is_here(name)
 
 
 def manifest(prepared: PreparedBatch) -> dict[str, Any]:

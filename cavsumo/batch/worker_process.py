@@ -16,6 +16,7 @@ from multiprocessing.connection import Connection
 from cavsumo.batch.jobs import Job
 from cavsumo.batch.prepared import PreparedBatch
 from cavsumo.errors import CavsumoError
+from cavsumo.model.objects import take
 from cavsumo.model.offspring import adopt_orphans, kill_descendants
 from cavsumo.model.processes import leash
 
@@ -45,6 +46,7 @@ def _serve(pipe: Connection, prepared: PreparedBatch, strict: bool) -> None:
     from cavsumo.batch.episode_runner import EpisodeRunner
 
     with contextlib.ExitStack() as stack:
+        take(prepared.objects)
         try:
             prepared.check_here()
             runner = stack.enter_context(
