@@ -20,6 +20,7 @@ from cavsumo.model.objects import SentObject
 from cavsumo.model.own_folders import OwnFolder
 from cavsumo.model.scenario import BatchPlan, Scenario
 from cavsumo.report.files import ReportOptions, write_report_files
+from cavsumo.results.columns import COLUMNS
 from cavsumo.results.reading import COMPLETE, read_results, whole_lines
 
 if TYPE_CHECKING:
@@ -75,12 +76,11 @@ class Results:
 
     @cached_property
     def columns(self) -> pandas.DataFrame:
-        """The columns of ``rows`` by name: the meaning of each."""
+        """The columns of ``rows`` by name: the meaning of each, and the unit of its numbers."""
         import pandas
 
-        said = dict(self.manifest.get("columns") or {})
-        meanings = [said.get(name, "") for name in self.rows.columns]
-        return pandas.DataFrame({"meaning": meanings}, index=self.rows.columns)
+        said = [(column.meaning, column.unit) for column in COLUMNS.values()]
+        return pandas.DataFrame(said, index=list(COLUMNS), columns=["meaning", "unit"])
 
     @property
     def failures(self) -> pandas.DataFrame:

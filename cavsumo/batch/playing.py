@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from concurrent.futures import Executor
 
-from cavsumo.agents.casting import make_agents
 from cavsumo.batch.batch_run import BatchRun
 from cavsumo.batch.executors import Means, opened
 from cavsumo.batch.interrupts import Interrupts
@@ -86,7 +85,7 @@ def _play(
         sequential=looks_at_rows(prepared.plan),
         shared=prepared.plan.reset == "shared",
         cut_short=batch_run.cut_short or batch_run.status == "interrupted",
-        promises={n: make_agents(prepared.plan, n)[0].promise for n in prepared.plan.cast},
+        promises={member.label: member.promise for member in prepared.cast},
     )
 
 

@@ -49,9 +49,7 @@ def _serve(pipe: Connection, prepared: PreparedBatch, strict: bool) -> None:
         take(prepared.objects)
         try:
             prepared.check_here()
-            runner = stack.enter_context(
-                EpisodeRunner(prepared.plan, prepared.site, prepared.checksums)
-            )
+            runner = stack.enter_context(EpisodeRunner(prepared))
             runner.try_out(strict=strict)
         except (CavsumoError, OSError) as error:
             pipe.send(str(error))

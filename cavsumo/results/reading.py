@@ -18,11 +18,6 @@ FORMAT = "cavsumo-results-1"
 STARTING = "starting"  # a manifest that says so owns none of the rows that lie beside it
 COMPLETE = ("finished", "stopped", STARTING)  # the statuses of which no row would be missed
 HEADER = ",".join(COLUMNS) + "\n"
-# Columns that hold words; all others hold numbers.
-WORDS = frozenset(
-    "agent ego reset embodiment forecast outcome breach blame assertion verdicts tester reference "
-    "avoidable_note trace error".split()
-)
 
 
 def trace_name(csv_file: Path, run: int) -> str:
@@ -147,18 +142,20 @@ def read_results(csv_file: Path) -> pandas.DataFrame:
 
     rows = [row for _, row in whole_lines(csv_file) if row is not None]
     texts = pandas.DataFrame(rows, columns=list(COLUMNS), dtype="object")
-    return pandas.DataFrame({name: _values(texts[name], csv_file) for name in COLUMNS})
+    texts = texts.where(texts != "")
+    values = {
+        name: texts[name] if column.words else _numbers(texts[name], csv_file)
+        for name, column in COLUMNS.items()
+    }
+    return pandas.DataFrame(values)
 
 
-def _values(texts: pandas.Series, csv_file: Path) -> pandas.Series:
-    """The values of a column, which stand there as text."""
+def _numbers(texts: pandas.Series, csv_file: Path) -> pandas.Series:
+    """The numbers of a column, which stand there as text."""
     import pandas
 
-    found = texts.where(texts != "")
-    if texts.name in WORDS:
-        return found
-    numbers = pandas.to_numeric(found, errors="coerce")
-    wrong = texts[numbers.isna() & found.notna()]
+    numbers = pandas.to_numeric(texts, errors="coerce")
+    wrong = texts[numbers.isna() & texts.notna()]
     if len(wrong):
         raise ResultsError(
             f"results {str(csv_file)!r}: line {wrong.index[0] + 2}: {texts.name} is "
