@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -89,7 +90,9 @@ def _means(jobs: int | None, executor: Any, scheduler: str | None) -> Means:
 
 def _play(settings: Mapping[str, Any], file: Path, means: Means, manner: Manner) -> None:
     """Play a batch into a file."""
-    part = Part("", dict(settings), {"net": DEFAULT})
-    _, interrupted = played(checked([part], file, manner), means, manner)
+    (batch,) = checked([Part("", dict(settings), {"net": DEFAULT})], file, manner)
+    said = ", ".join(f"{key}={value!r}" for key, value in settings.items())
+    manifest = {**batch.manifest, "command": [], "call": f"cavsumo.run({said})"}
+    _, interrupted = played([replace(batch, manifest=manifest)], means, manner)
     if interrupted:
         raise KeyboardInterrupt

@@ -10,7 +10,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Any
 
-from cavsumo.batch.worker import close_all
+from cavsumo.batch.worker import Worker, close_all, join_group
 from cavsumo.errors import InputError
 
 CONNECT_S = 10.0  # how long to look for a scheduler, and for its first worker
@@ -73,12 +73,13 @@ def _is_client(executor: Any) -> bool:
 @contextmanager
 def local_executor(jobs: int) -> Iterator[Executor]:
     """Threads, each of which waits for a process of its own (``worker.play``)."""
-    executor = ThreadPoolExecutor(jobs, "cavsumo")
+    workers: set[Worker] = set()
+    executor = ThreadPoolExecutor(jobs, "cavsumo", initializer=join_group, initargs=(workers,))
     try:
         yield executor
     finally:
         executor.shutdown(wait=False, cancel_futures=True)
-        close_all()  # what is still played is not wanted any more
+        close_all(workers)  # what is still played is not wanted any more
         executor.shutdown(wait=True)
 
 
