@@ -50,7 +50,7 @@ def run(
         progress: show a bar, in a notebook or on a terminal.
         resume: go on where the results end, or start.
         retry_errors: play the episodes again that ended in errors.
-        overwrite: start again in place of an unfinished batch.
+        overwrite: start again in place of what lies there: an unfinished batch, or another one.
         **settings: of the scenario and of the batch, by their names in a scenario file
             (docs/python.md): ``agents``, ``ego``, ``testers``, ``runs``, ``seed`` ...
 

@@ -7,6 +7,7 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
+from cavsumo.batch.preflight import check_kept
 from cavsumo.batch.prepared import OUTPUTS
 from cavsumo.batch.replay import recorded_plan
 from cavsumo.batch.summary import Ended
@@ -28,6 +29,8 @@ def merged(parts: Sequence[Path], output: Path, *, overwrite: bool) -> Ended:
         raise ResultsError(f"output {str(output)!r}: is one of the parts")
     whole = _whole_manifest(parts)
     _check_whole(parts, whole)
+    if not overwrite:
+        check_kept(output, whole)
     tally = Tally()
     with Recorder(output) as recorder:
         recorder.begin(whole, overwrite=overwrite)

@@ -86,6 +86,21 @@ def read_study(file: Path, given: Mapping[str, Any]) -> list[Part]:
         raise InputError(f"config {str(file)!r}: {VARY}: {error}") from error
 
 
+def at_each(parts: Sequence[Part], nets: Sequence[str]) -> list[Part]:
+    """Each batch on each of several networks, called by the network first."""
+    names = [Path(net).name.split(".")[0] for net in nets]
+    for name, net in zip(names, nets, strict=True):
+        if names.count(name) > 1:
+            raise InputError(f"--net {net}: another network is called {name!r} as well")
+    if len(parts) * len(nets) > MOST:
+        raise InputError(f"--net: {len(parts) * len(nets)} batches, at most {MOST} are played")
+    return [
+        Part(f"{name}-{part.name}" if part.name else name, {**part.settings, "net": net})
+        for name, net in zip(names, nets, strict=True)
+        for part in parts
+    ]
+
+
 def choices_in(varied: Any, file: Path) -> dict[str, list[Choice]]:
     """The entries of a table ``[vary]``; raises InputError for what is none."""
     if not (isinstance(varied, dict) and varied):

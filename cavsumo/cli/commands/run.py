@@ -23,7 +23,11 @@ def run(settings: Mapping[str, Any], output: Path, means: Means, manner: Manner)
 
 def run_study(parts: Sequence[Part], output: Path, means: Means, manner: Manner) -> int:
     """Play one batch after another; all are checked before anything is written."""
-    ended, interrupted = played(checked(parts, output, manner), means, manner, announce)
+    batches = checked(parts, output, manner)
+    for batch in batches:
+        if batch.replaced:
+            print(_replacement(batch), file=sys.stderr)
+    ended, interrupted = played(batches, means, manner, announce)
     if not manner.quiet:
         summarise(ended)
     return exit_status(ended, interrupted, manner.exit_zero)
@@ -43,6 +47,14 @@ def exit_status(ended: Sequence[Ended], interrupted: bool, exit_zero: bool) -> i
 def announce(batch: CheckedBatch, jobs: int) -> None:
     """Say on stderr what was chosen."""
     print(_first_line(batch, jobs), file=sys.stderr)
+
+
+def _replacement(batch: CheckedBatch) -> str:
+    """What is lost by a batch, for the user to see."""
+    return (
+        f"cavsumo: {str(batch.output)!r}: another batch of {batch.replaced} episodes is replaced; "
+        "-o FILE keeps the next one"
+    )
 
 
 def _first_line(batch: CheckedBatch, jobs: int) -> str:
