@@ -15,7 +15,7 @@ from cavsumo.batch.shown import shown_site
 from cavsumo.batch.worker import Worker
 from cavsumo.errors import InputError
 from cavsumo.network.site import Site
-from cavsumo.results.traces import Trace, parsed, states
+from cavsumo.results.traces import Trace, states
 
 if TYPE_CHECKING:
     import pandas
@@ -86,9 +86,9 @@ def played_again(record: Record) -> RecordedEpisode:
     with Worker(prepared) as worker:
         again = replayed(worker, record)
     compare(record, again)
-    if not again.trace:
+    if again.trace is None:
         raise InputError(f"replay: run {record.run} ended in an error, there is nothing to show")
-    return RecordedEpisode(record, parsed(again.trace), prepared.site)
+    return RecordedEpisode(record, again.trace, prepared.site)
 
 
 def as_recorded(record: Record) -> RecordedEpisode:

@@ -5,9 +5,11 @@ from __future__ import annotations
 import dataclasses
 import hashlib
 import math
+import pickle
 import sys
 from collections.abc import Collection, Mapping, Set
 from dataclasses import dataclass, field
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
@@ -16,6 +18,7 @@ import numpy as np
 from cavsumo.agents.casting import Cast, resolve_cast
 from cavsumo.agents.manoeuvres import types_for
 from cavsumo.assertions import make_assertions
+from cavsumo.batch.plan_names import check_names
 from cavsumo.egos import make_ego
 from cavsumo.egos.base import Ego
 from cavsumo.egos.ego_files import data_files, machine
@@ -61,6 +64,14 @@ class PreparedBatch:
         facts = (self.plan.model_dump_json(), self.folder, self.checksums, self.versions)
         object.__setattr__(self, "key", hashlib.sha256(repr(facts).encode()).hexdigest())
 
+    @cached_property
+    def packed(self) -> bytes:
+        """The batch as every process gets it, pickled once for all of them."""
+        return pickle.dumps({f.name: getattr(self, f.name) for f in dataclasses.fields(self)})
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return _unpacked, (self.packed,)
+
     def check_here(self) -> None:
         """Raise InputError unless this process sees the same inputs and versions.
 
@@ -85,12 +96,20 @@ class PreparedBatch:
         return dataclasses.replace(self, checksums=kept)
 
 
+def _unpacked(packed: bytes) -> PreparedBatch:
+    """A batch that came from another process; it goes on to a third one as it came."""
+    batch = object.__new__(PreparedBatch)
+    batch.__dict__.update(pickle.loads(packed), packed=packed)
+    return batch
+
+
 def prepare(plan: BatchPlan, ego: Ego | None = None) -> PreparedBatch:
     """Check every name and parameter of a plan and derive its site; raises InputError.
 
     ``ego`` drives instead of the one that the plan names.
     """
     scenario = plan.scenario
+    check_names(plan)
     cast = resolve_cast(plan)
     for member in cast:
         member.make().prepare()

@@ -15,6 +15,7 @@ from cavsumo.results.column import Column, FinishedEpisode, Measured
 if TYPE_CHECKING:
     from cavsumo.agents.base import Forecast
     from cavsumo.simulation.avoidability import Avoidability
+    from cavsumo.simulation.ego_progress import EgoProgress
     from cavsumo.simulation.loop import Episode
 
 Row = dict[str, Any]
@@ -78,6 +79,11 @@ def _foretold(value: Callable[[Forecast], Any], none: Any = None) -> Measured:
 def _with_ego(episode: Episode) -> int:
     """How many collisions with the ego SUMO reported."""
     return sum("ego" in pair for pair in episode.sumo_collisions)
+
+
+def _driven(value: Callable[[EgoProgress], Any]) -> Measured:
+    """A value of the ego's drive."""
+    return Measured(lambda episode: value(episode.progress))
 
 
 def _retried(value: Callable[[Avoidability], Any]) -> Callable[[FinishedEpisode], Any]:
@@ -246,6 +252,40 @@ _ALL = (
         "hardest braking of the ego",
         "m/s²",
         Measured(lambda episode: episode.max_decel),
+    ),
+    Column(
+        "arrived",
+        "1 if the ego came to the end of its route, 0 if not although the episode lasted to its "
+        "end; empty if a verdict ended the episode before",
+        "",
+        _driven(lambda ego: None if ego.arrived is None else int(ego.arrived)),
+    ),
+    Column(
+        "driven_m",
+        "how far the ego came along its route",
+        "m",
+        _driven(lambda ego: ego.driven),
+    ),
+    Column(
+        "mean_speed_mps",
+        "mean speed of the ego along its route",
+        "m/s",
+        _driven(lambda ego: ego.driven / ego.time if ego.time > 0.0 else None),
+    ),
+    Column(
+        "lost_s",
+        "time that the ego lost against a free drive to the same place: on an empty road, at the "
+        "speed limits, without lights (docs/results.md); negative if it was faster",
+        "s",
+        _driven(lambda ego: ego.lost),
+    ),
+    Column("stood_s", "how long the ego stood", "s", _driven(lambda ego: ego.stood)),
+    Column(
+        "frozen",
+        "stood if the ego had been standing for 10 s or longer when the episode ended, crawled if "
+        "it needed, while it moved, more than four times as long as the free drive; else empty",
+        "",
+        _driven(lambda ego: ego.frozen),
     ),
     Column(
         "avoidable",

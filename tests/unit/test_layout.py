@@ -31,7 +31,7 @@ ROOMS = {
         "report": "model network assertions egos results batch",
         "interop": "model network sumo results",
         "api": "model network batch report results",
-        "envs": "model agents assertions egos simulation results batch",
+        "envs": "model network agents assertions egos simulation results batch",
         "testing": "model network agents assertions egos",
         "cli": "model games network agents assertions egos results batch report interop testing",
     }.items()
