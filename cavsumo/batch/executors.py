@@ -35,7 +35,7 @@ class Means:
     def __post_init__(self) -> None:
         if self.jobs is not None and self.jobs < 1:
             raise InputError(f"jobs: expected a number of at least 1, got {self.jobs}")
-        ours = isinstance(self.executor, str)
+        ours = isinstance(self.executor, str) and self.executor in EXECUTORS
         if not (ours or isinstance(self.executor, Executor) or _is_client(self.executor)):
             raise InputError(
                 "executor: expected a concurrent.futures.Executor or a dask Client, got "
