@@ -25,7 +25,8 @@ WORD = 28  # columns that words need at least, where there are so many
 
 def as_table(report: Report) -> str:
     """Tables for people, 100 columns wide where the figures allow it."""
-    console = Console(file=io.StringIO(), width=WIDTH, color_system=None)
+    text = io.StringIO()  # rich would show it in a notebook instead
+    console = Console(file=text, width=WIDTH, color_system=None, force_jupyter=False)
     for i, table in enumerate(tables(report)):
         if i:
             console.print()
@@ -37,9 +38,7 @@ def as_table(report: Report) -> str:
         console.width = WIDTH
         for note in table.notes:
             console.print(Padding(Text(note), (0, 0, 0, INDENT)), highlight=False)
-    stream = console.file
-    assert isinstance(stream, io.StringIO)
-    return "".join(f"{line.rstrip()}\n" for line in stream.getvalue().splitlines())
+    return "".join(f"{line.rstrip()}\n" for line in text.getvalue().splitlines())
 
 
 def _grid(table: Table) -> Grid:

@@ -283,10 +283,15 @@ def test_a_replay_is_a_table_and_a_page(results: Results, tmp_path: Path) -> Non
         results.replay(99)
 
 
-def test_a_report_has_the_format_of_its_name(results: Results, tmp_path: Path) -> None:
-    """As the command's; another ending is refused before anything is read."""
+def test_a_report_has_the_format_of_its_name(
+    results: Results, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """As the command's, in a notebook too; another ending is refused before anything is read."""
+    monkeypatch.setattr("rich.console._is_jupyter", lambda: True)
     results.report(tmp_path / "report.md")
     results.report(tmp_path / "report.xml")
+    results.report(tmp_path / "report.txt")
+    assert "Shares, with 95 % intervals" in (tmp_path / "report.txt").read_text(encoding="utf-8")
     assert "| timing" in (tmp_path / "report.md").read_text(encoding="utf-8")
     assert "<testsuite" in (tmp_path / "report.xml").read_text(encoding="utf-8")
     with pytest.raises(cavsumo.InputError, match=r"ends in \.html, \.xml, \.md"):
