@@ -12,7 +12,7 @@ from typing import Any
 
 import pytest
 from shapely.geometry import LineString, box
-from support import CHROMIUM, LAPTOP, OPTIONS, prepared_at
+from support import CHROMIUM, LAPTOP, OPTIONS, ROOT, prepared_at
 
 from cavsumo.agents.base import Scene
 from cavsumo.batch.episode_runner import EpisodeRunner
@@ -31,7 +31,6 @@ from cavsumo.network.site import Site
 from cavsumo.results.traces import Trace, parsed
 from cavsumo.sumo.world import World
 
-ROOT = Path(__file__).parents[1]
 NAMES = ("crossing", "junction", "pedestrians")
 
 # The straight road of networks/pedestrians.net.xml, in metres.

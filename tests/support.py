@@ -20,6 +20,8 @@ from cavsumo.network.site import Site
 from cavsumo.results.provenance import checksums, versions
 from cavsumo.results.reading import read_rows
 
+ROOT = Path(__file__).parents[1]  # the repository
+DATA = ROOT / "tests" / "data"
 PATIENCE_S = 60.0
 CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser")
 OPTIONS = (
@@ -28,7 +30,7 @@ OPTIONS = (
 ).split()
 LAPTOP, PHONE = {"width": 1280, "height": 800}, {"width": 390, "height": 844}
 # Settings of a short environment on the straight road.
-STRAIGHT_NET = str(Path(__file__).parents[1] / "networks" / "pedestrians.net.xml")
+STRAIGHT_NET = str(ROOT / "networks" / "pedestrians.net.xml")
 SHORT = {"net": STRAIGHT_NET, "routes": "none", "end": 6.0}
 
 
@@ -41,7 +43,7 @@ def prepared_at(plan: BatchPlan, site: Site) -> PreparedBatch:
 
 def benchmark(name: str) -> Any:
     """A module of benchmarks/, which is no package."""
-    file = Path(__file__).parents[1] / "benchmarks" / f"{name}.py"
+    file = ROOT / "benchmarks" / f"{name}.py"
     spec = importlib.util.spec_from_file_location(name, file)
     assert spec is not None
     assert spec.loader is not None

@@ -8,17 +8,18 @@ from functools import cached_property
 from typing import Any
 
 from cavsumo.agents import Agent
-from cavsumo.assertions.base import INVALID, VIOLATED, Judgement
-from cavsumo.batch.jobs import Job, Memory, failed_row, head
+from cavsumo.assertions.base import VIOLATED
+from cavsumo.batch.jobs import Job, Memory, finished
 from cavsumo.batch.messages import Answer
 from cavsumo.batch.prepared import PreparedBatch
 from cavsumo.egos.reference import REFERENCES
 from cavsumo.errors import CavsumoError, EgoError
 from cavsumo.model.scenario import Simulation
 from cavsumo.model.seeds import episode_seed
-from cavsumo.results.rows import Outcome, Row, verdicts_cell
+from cavsumo.results.columns import Row, row_of
+from cavsumo.results.rows import Outcome
 from cavsumo.results.traces import frame, origin, trace_head, trace_text
-from cavsumo.simulation.avoidability import Avoidability, AvoidabilityCheck
+from cavsumo.simulation.avoidability import AvoidabilityCheck
 from cavsumo.simulation.loop import Episode, play
 from cavsumo.simulation.setup import make_setup
 
@@ -72,30 +73,20 @@ class EpisodeRunner:
                 self.setup, agents, job.seed, record=record, keep=retry, simulation=job.simulation
             )
             memory = _recall(agents)
-            row = head(self.plan, job) | measured(episode)
             log = self.setup.ego.take_log()
+            avoidability = None
             if retry and episode.outcome == VIOLATED:
                 retrial = AvoidabilityCheck(self.setup, agents, job.seed, record, episode, beat)
-                row |= self._avoidable(retrial)
+                avoidability = retrial.judged(REFERENCES.make(self.plan.reference, {}))
+            row = row_of(finished(self.plan, job, episode, avoidability))
             trace = self._trace(job, row, before, episode) if record else ""
         except Exception as error:  # whatever it is, it costs this row and no other
             said = str(error) if isinstance(error, CavsumoError) else f"defect: {error!r}"
-            row, trace, memory = failed_row(self.plan, job, said), "", job.memory
+            row, trace = row_of(finished(self.plan, job, error=said)), ""
+            memory = job.memory
         row["wall_s"] = time.perf_counter() - begun
         said_later = self.setup.ego.take_log()  # of an episode that failed; a rerun's is not kept
         return Answer(Outcome(row, trace, log or said_later), memory)
-
-    def _avoidable(self, retrial: AvoidabilityCheck) -> Row:
-        """Whether the plan's reference driver would have avoided a violation."""
-        verdict: Avoidability = retrial.judged(REFERENCES.make(self.plan.reference, {}))
-        avoidable = None if verdict.avoidable is None else int(verdict.avoidable)
-        return {
-            "avoidable": avoidable,
-            "reference": self.plan.reference,
-            "last_chance_s": verdict.last_chance,
-            "margin_s": verdict.margin,
-            "avoidable_note": verdict.note,
-        }
 
     def _team(self, label: str) -> tuple[list[Agent], Memory | None]:
         """The agents of a label, and what they knew when they were built."""
@@ -118,54 +109,6 @@ class EpisodeRunner:
             first = trace_head(self._origin, row, memory, episode.frames)
             return trace_text(first, map(frame, episode.frames))
         return ""
-
-
-def measured(episode: Episode) -> Row:
-    """The columns of a row that a finished episode fills."""
-    judgement, contacts = episode.judgement, episode.contacts
-    if episode.invalid and episode.breach:  # what the assertions said is in ``verdicts``
-        judgement = Judgement("", INVALID, episode.breach.tester)
-    ttc, drac, pet = episode.criticality.extremes()
-    with_ego = {pair for pair in episode.sumo_collisions if "ego" in pair}
-    forecast = episode.forecast
-    return {
-        "forecast": forecast.verdict if forecast else "",
-        "forecast_value": forecast.value if forecast else None,
-        "outcome": judgement.verdict,
-        "breach": str(episode.breach or ""),
-        "blame": episode.blame,
-        "assertion": judgement.assertion if judgement.triggered else "",
-        "verdicts": verdicts_cell(episode.verdicts),
-        "robustness": _signed(judgement),
-        "tester": judgement.tester,
-        "trigger_time_s": judgement.trigger_time,
-        "violation_time_s": judgement.violation_time,
-        "time_s": episode.time,
-        "steps": episode.steps,
-        "min_gap_m": contacts.min_gap,
-        "min_ttc_s": ttc,
-        "max_drac_mps2": drac,
-        "pet_s": pet,
-        "ego_speed_mps": judgement.ego_speed,
-        "impact_speed_mps": judgement.impact_speed,
-        "max_decel_mps2": episode.max_decel,
-        "cost": episode.cost,
-        "accel_rms_mps2": episode.rms_acceleration,
-        "turning_rad": episode.naturalness.turning,
-        "reward": episode.reward,
-        "contacts": len(contacts.ego_pairs),
-        "tester_contacts": len(contacts.tester_pairs),
-        "sumo_collisions": len(with_ego),
-        "background_collisions": len(episode.sumo_collisions - with_ego),
-        "emergency_stops": episode.emergency_stops,
-        "teleports": episode.teleports,
-    }
-
-
-def _signed(said: Judgement) -> float | None:
-    """The robustness as the CSV has it: rounded, what is violated stays below zero."""
-    value = said.robustness
-    return min(value, -0.001) if value is not None and said.verdict == VIOLATED else value
 
 
 def _recall(agents: Sequence[Agent]) -> Memory | None:

@@ -18,9 +18,9 @@ from cavsumo.errors import DivergenceError, InputError, ResultsError
 from cavsumo.model.checksums import checksum
 from cavsumo.model.named_networks import check_network, network_file, routes_file
 from cavsumo.model.scenario import BatchPlan, Scenario
-from cavsumo.results.columns import COLUMNS
+from cavsumo.results.columns import COLUMNS, Row
 from cavsumo.results.reading import STARTING, inside, read_manifest, read_rows
-from cavsumo.results.rows import Row, cell
+from cavsumo.results.rows import cell
 from cavsumo.results.traces import NOT_REPLAYED, Trace, parsed, read_trace
 
 

@@ -21,9 +21,9 @@ from cavsumo.model.bodies import Body
 from cavsumo.model.scenario import BatchPlan
 from cavsumo.model.snapshot import BodyState, Snapshot
 from cavsumo.network.site import Site
-from cavsumo.results.columns import COLUMNS
+from cavsumo.results.columns import COLUMNS, Row
 from cavsumo.results.provenance import EXTENT, traffic_checksum, versions
-from cavsumo.results.rows import Row, cell
+from cavsumo.results.rows import cell
 from cavsumo.sumo.options import OPTIONS
 
 FORMAT = "cavsumo-trace-1"
