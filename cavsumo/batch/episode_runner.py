@@ -14,6 +14,7 @@ from cavsumo.batch.messages import Answer
 from cavsumo.batch.prepared import PreparedBatch
 from cavsumo.egos.reference import REFERENCES
 from cavsumo.errors import CavsumoError, EgoError
+from cavsumo.model.objects import is_instance
 from cavsumo.model.scenario import Simulation
 from cavsumo.model.seeds import episode_seed
 from cavsumo.results.columns import Row, row_of
@@ -89,8 +90,11 @@ class EpisodeRunner:
         return Answer(Outcome(row, trace, log or said_later), memory)
 
     def _team(self, label: str) -> tuple[list[Agent], Memory | None]:
-        """The agents of a label, and what they knew when they were built."""
-        if label not in self._agents:
+        """The agents of a label, and what they knew when they were built; fresh copies of one that
+        was given as an object.
+        """
+        member = self.prepared.cast[label]
+        if label not in self._agents or is_instance(member.name):
             agents = self.prepared.cast.agents(label)
             self._agents[label] = agents, _recall(agents)
         return self._agents[label]

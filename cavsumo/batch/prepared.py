@@ -18,11 +18,13 @@ import numpy as np
 from cavsumo.agents.casting import Cast, resolve_cast
 from cavsumo.agents.manoeuvres import types_for
 from cavsumo.assertions import make_assertions
+from cavsumo.batch.plan_names import check_names
 from cavsumo.egos import make_ego
 from cavsumo.egos.base import Ego
 from cavsumo.egos.ego_files import data_files, machine
 from cavsumo.errors import InputError
 from cavsumo.model.bodies import WALKING, Kind, kind_named
+from cavsumo.model.objects import SentObject, objects_among
 from cavsumo.model.scenario import BatchPlan, Scenario
 from cavsumo.network.site import Site, Wishes, derive_site
 from cavsumo.network.traffic import Volume
@@ -44,6 +46,7 @@ class PreparedBatch:
         checksums: of the plan's files, so that a process elsewhere notices other ones.
         versions: of what the results depend on.
         machine: that on which it was prepared; files that an ego writes differ on others.
+        objects: the agents, the ego and the assertions that are objects of a Python session.
         key: stands for all of it.
     """
 
@@ -54,6 +57,7 @@ class PreparedBatch:
     checksums: Mapping[str, str]
     versions: Mapping[str, str]
     machine: str = field(default_factory=machine)
+    objects: tuple[SentObject, ...] = ()
     key: str = field(init=False)
 
     def __post_init__(self) -> None:
@@ -105,6 +109,7 @@ def prepare(plan: BatchPlan, ego: Ego | None = None) -> PreparedBatch:
     ``ego`` drives instead of the one that the plan names.
     """
     scenario = plan.scenario
+    check_names(plan)
     cast = resolve_cast(plan)
     for member in cast:
         member.make().prepare()
@@ -133,7 +138,8 @@ def prepare(plan: BatchPlan, ego: Ego | None = None) -> PreparedBatch:
         kinds, rng = [kind] * scenario.testers, np.random.default_rng(plan.seed)
         site.draw(kinds, ego.kind, scenario.start_speed, rng)
     inputs = checksums(scenario, cast.files)
-    return PreparedBatch(plan, cast, site, str(Path.cwd()), inputs, versions())
+    objects = objects_among([*plan.cast.values(), scenario.ego, *scenario.assertions])
+    return PreparedBatch(plan, cast, site, str(Path.cwd()), inputs, versions(), objects=objects)
 
 
 def wishes(plan: BatchPlan, kind: Kind, ego: Ego, manoeuvres: Set[str]) -> Wishes:

@@ -260,8 +260,10 @@ def first_difference(
             what = f"{len(frames)} frames were recorded, {len(frames_again)} replayed"
             return Difference("the end of the trace", what, end, quantity="frames")
     for column in COLUMNS:
-        if column not in NOT_REPLAYED and row.get(column, "") != cell(again.get(column)):
-            what = f"recorded {row.get(column)!r}, replayed {cell(again.get(column))!r}"
+        if column in NOT_REPLAYED or column not in row:  # of a version before it had the column
+            continue
+        if row[column] != cell(again.get(column)):
+            what = f"recorded {row[column]!r}, replayed {cell(again.get(column))!r}"
             return Difference("the row", f"{column} {what}", None, quantity=column)
     return None
 

@@ -46,6 +46,7 @@ class Worker:
         self._process: subprocess.Popen[bytes] | None = None
         self._busy = threading.Lock()
         self._played = 0
+        self._group: set[Worker] = getattr(_THREAD, "group", _WORKERS)
         self.closed = False
 
     def __enter__(self) -> Worker:
@@ -86,7 +87,7 @@ class Worker:
             _kill(self._process)
         with self._busy:
             self._stop()
-        _WORKERS.discard(self)
+        self._group.discard(self)
 
     def _start(self, *, strict: bool) -> None:
         """Start the process and wait until it can play; nothing to do if it runs.
@@ -145,7 +146,7 @@ class Worker:
         fds = theirs.fileno(), self._log.fileno()
         # what a killed process leaves goes with this folder
         environment = inner_environment() | {"TMPDIR": self._folder.name}
-        _WORKERS.add(self)
+        self._group.add(self)
         try:
             self._process = by_a_lasting_thread(lambda: self._started(fds, environment))
         except OSError as error:
@@ -248,10 +249,16 @@ def _kill(process: subprocess.Popen[bytes]) -> None:
     process.wait(10.0)
 
 
-# The workers of this process, one for each thread that plays.
+# The workers of this process, one for each thread that plays. Those of an executor of ours are a
+# group, so that batches played at the same time in one process end their own workers only.
 
-_WORKERS: set[Worker] = set()
+_WORKERS: set[Worker] = set()  # of threads in no group
 _THREAD = threading.local()
+
+
+def join_group(group: set[Worker]) -> None:
+    """Have the workers of this thread in a group."""
+    _THREAD.group = group
 
 
 def play(prepared: PreparedBatch, jobs: Sequence[Job]) -> list[Answer]:
@@ -284,9 +291,9 @@ def try_out(prepared: PreparedBatch) -> None:
     _own_worker(prepared).start()
 
 
-def close_all() -> None:
-    """End all processes that threads of this process have started."""
-    for worker in list(_WORKERS):
+def close_all(group: set[Worker] = _WORKERS) -> None:
+    """End all processes of a group of workers, by default of those in none."""
+    for worker in list(group):
         worker.close()
 
 

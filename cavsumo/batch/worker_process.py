@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING
 
 from cavsumo.batch.messages import Reply, Task
 from cavsumo.errors import CavsumoError
+from cavsumo.model.objects import take
 from cavsumo.model.offspring import adopt_orphans, kill_descendants
 from cavsumo.model.processes import leash
 
@@ -48,6 +49,7 @@ def _serve(pipe: Connection, first: Task) -> None:
     prepared = first.batch
     assert prepared is not None
     with contextlib.ExitStack() as stack:
+        take(prepared.objects)
         try:
             prepared.check_here()
             runner = stack.enter_context(EpisodeRunner(prepared))
