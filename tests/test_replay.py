@@ -367,7 +367,8 @@ def test_the_files_of_a_trace_can_be_named(
         ({"plan": {}}, "holds no valid plan"),
         ({"row": {"run": "x"}}, "holds no valid plan"),
         ({"memory_kept": False}, "had learned before, which is large"),
-        ({"format": "x"}, "line 1 is not the head"),
+        ({"format": "x"}, "format x, this version reads cavsumo-trace-1 and cavsumo-trace-2"),
+        ({"format": 7}, "line 1 is not the head"),
     ],
 )
 def test_heads_that_do_not_suffice_are_refused(

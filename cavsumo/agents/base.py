@@ -8,6 +8,7 @@ from typing import Any, ClassVar, NamedTuple
 import numpy as np
 
 from cavsumo.model.bodies import NOOP, Action, Kind
+from cavsumo.model.carriageway import StartRecord
 from cavsumo.model.registry import Registry
 from cavsumo.model.scene import Scene
 from cavsumo.model.snapshot import BodyState, Snapshot
@@ -41,6 +42,8 @@ class Agent:
             from its bodies. Set False where it does not: when nobody in an episode does, bodies
             that are far from everybody are left out of the snapshots.
         drives: whether its bodies may be vehicles. Set False where it can only walk.
+        recorded_starts: where its bodies start, for an agent that plays back; empty to draw it.
+        recorded_waits: where they wait until the ego has entered; empty for where they start.
         FILES: its parameters that name files; their checksums are noted with the results.
     """
 
@@ -49,6 +52,8 @@ class Agent:
     learns: bool = False  # whether episodes change what it knows: then they are played in sequence
     sees_background: bool = True
     drives: bool = True
+    recorded_starts: Sequence[StartRecord] = ()
+    recorded_waits: Sequence[StartRecord] = ()
     promise: str = ""  # against whom its forecasts hold; empty for agents that make none
 
     scene: Scene

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import time
 from collections.abc import Callable, Mapping, Sequence
 from functools import cached_property
@@ -20,6 +21,7 @@ from cavsumo.results.rows import Outcome, Row, verdicts_cell
 from cavsumo.results.traces import frame, origin, trace_head, trace_text
 from cavsumo.simulation.avoidability import Avoidability, AvoidabilityCheck
 from cavsumo.simulation.loop import Episode, play
+from cavsumo.simulation.playback import recorded
 from cavsumo.simulation.setup import make_setup
 
 
@@ -73,19 +75,27 @@ class EpisodeRunner:
         begun = time.perf_counter()
         log = ""
         try:
-            agents = self._cast(job)
+            agents = self._agents_of(job)
             before = _recall(agents)
             own = job.simulation == "own"
             record = job.record or (self.plan.trace != "none" and own)
+            demand = job.recorded.departures if job.recorded else None
             retry = own and self.plan.reference != "none"
             episode = play(
-                self.setup, agents, job.seed, record=record, keep=retry, simulation=job.simulation
+                self.setup,
+                agents,
+                job.seed,
+                record=record,
+                keep=retry,
+                simulation=job.simulation,
+                demand=demand,
             )
             memory = _recall(agents)
             row = head(self.plan, job) | measured(episode)
             log = self.setup.ego.take_log()
             if retry and episode.outcome == VIOLATED:
-                retrial = AvoidabilityCheck(self.setup, agents, job.seed, record, episode, beat)
+                played = self.setup, agents, job.seed, record, episode
+                retrial = AvoidabilityCheck(*played, beat, demand)
                 row |= self._avoidable(retrial)
             trace = self._trace(job, row, before, episode) if record else ""
         except Exception as error:  # whatever it is, it costs this row and no other
@@ -107,6 +117,10 @@ class EpisodeRunner:
             "avoidable_note": verdict.note,
         }
 
+    def _agents_of(self, job: Job) -> Sequence[Agent]:
+        """Those who play a job."""
+        return self._cast(job) if job.recorded is None else job.recorded.agents(self.setup.teams)
+
     def _cast(self, job: Job) -> list[Agent]:
         """The agents of a job, with their memory."""
         if job.agent not in self._agents:
@@ -120,10 +134,12 @@ class EpisodeRunner:
 
     def _trace(self, job: Job, row: Row, memory: Any, episode: Episode) -> str:
         """The frames worth keeping: of tests found, or of every episode if asked."""
-        if episode.frames and (job.record or episode.judgement.triggered):
-            first = trace_head(self._origin, row, memory, episode.frames)
-            return trace_text(first, map(frame, episode.frames))
-        return ""
+        if not (episode.frames and (job.record or episode.judgement.triggered)):
+            return ""
+        played = recorded(self.setup, episode, job.seed, episode.departures)
+        first = trace_head(self._origin, row, memory, episode.frames, played)
+        frames = itertools.zip_longest(episode.frames, played.actions, fillvalue=())
+        return trace_text(first, itertools.starmap(frame, frames))
 
 
 def measured(episode: Episode) -> Row:

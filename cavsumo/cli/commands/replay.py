@@ -6,7 +6,8 @@ import sys
 from dataclasses import dataclass
 from pathlib import Path
 
-from cavsumo.batch.prepared import PreparedBatch, manifest
+from cavsumo.batch.playback import NOT_PLAYED_BACK, for_playback, playback_job
+from cavsumo.batch.prepared import manifest
 from cavsumo.batch.replay import (
     Record,
     compare,
@@ -35,6 +36,7 @@ class ReplayOptions:
         run: number of the episode in results; None when a trace is given.
         net, routes: where the network and the routes are, if not where they were.
         recorded: take the trace as it is and play nothing.
+        playback: play its recorded actions and traffic instead of asking its agents.
         trust: play it even if that runs, imports or connects to what only the file names.
         html, fcd: files to write.
         gui: show it in sumo-gui, with so many milliseconds a timestep.
@@ -44,6 +46,7 @@ class ReplayOptions:
     net: Path | None = None
     routes: Path | None = None
     recorded: bool = False
+    playback: bool = False
     trust: bool = False
     html: Path | None = None
     fcd: Path | None = None
@@ -65,13 +68,14 @@ def replay(file: Path, wanted: ReplayOptions = ReplayOptions()) -> int:
         from cavsumo.interop.gui import check_gui
 
         check_gui(wanted.delay)
+    if wanted.playback and wanted.recorded:
+        raise InputError("replay: --recorded plays nothing and --playback plays; name one of them")
     record = _record(file, wanted)
     if wanted.recorded:
         trace: Trace | None = _recorded_trace(record)
         site = shown_site(record.plan, trace) if wanted.shown else None
     else:
-        prepared = prepared_again(record)
-        trace, site = _played(prepared, record), prepared.site
+        trace, site = _played(record, wanted.playback)
     if wanted.shown and trace is None:
         raise InputError(f"replay: run {record.run} ended in an error, there is nothing to show")
     if trace is not None and site is not None:
@@ -85,10 +89,13 @@ def _record(file: Path, wanted: ReplayOptions) -> Record:
     if file.suffix == TRACE:
         if wanted.run is not None:
             raise InputError(f"replay: {str(file)!r} is the trace of one episode; no run is named")
-        return located(recorded_alone(file, allowed), wanted.net, wanted.routes)
+        record = recorded_alone(file, allowed, anew=not wanted.playback)
+        record = for_playback(record) if wanted.playback else record
+        return located(record, wanted.net, wanted.routes)
     if wanted.run is None:
         raise InputError(f"replay: which run of {str(file)!r}? name its number")
     record = recorded(file, wanted.run, allowed)
+    record = for_playback(record) if wanted.playback else record
     if wanted.net or wanted.routes:
         return located(record, wanted.net, wanted.routes)
     return record
@@ -102,18 +109,21 @@ def _recorded_trace(record: Record) -> Trace:
     return record.trace
 
 
-def _played(prepared: PreparedBatch, record: Record) -> Trace | None:
-    """The trace of the episode played again, the recorded one; None where an error left none."""
+def _played(record: Record, playback: bool) -> tuple[Trace | None, Site]:
+    """The recorded episode played again or back, None where an error left none; and where."""
+    job = playback_job(record) if playback else None
+    prepared = prepared_again(record)
     for change in changes(record.origin, manifest(prepared)):
         print(f"cavsumo: {change}", file=sys.stderr)
     with Worker(prepared) as worker:
-        again = replayed(worker, record)
-    compare(record, again)
+        again = replayed(worker, record) if job is None else worker.play(job)[0]
+    compare(record, again, NOT_PLAYED_BACK if playback else ())
     frames = record.trace.frames if record.trace is not None else None
     compared = f"{len(frames)} frames" if frames is not None else "its row (no trace was kept)"
     row = record.row
-    print(f"run {record.run} ({row['agent']}): {row['outcome']}, {compared}: the same")
-    return parsed(again.trace) if again.trace else None
+    how = ", played back" if playback else ""
+    print(f"run {record.run} ({row['agent']}): {row['outcome']}, {compared}: the same{how}")
+    return parsed(again.trace) if again.trace else None, prepared.site
 
 
 def _show(site: Site, record: Record, trace: Trace, wanted: ReplayOptions) -> None:
