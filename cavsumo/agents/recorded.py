@@ -1,6 +1,6 @@
 """Episodes that are played back: the testers begin where they began and do what they did.
 
-A record is made from an episode in memory (``simulation.avoidability``) or from its trace
+A record is made from an episode in memory (``simulation.playback``) or from its trace
 (``results.recording``), and played by agents of this file, whatever the ego does now.
 """
 
@@ -34,6 +34,7 @@ class Recorded:
         starts: where each of them started; empty to draw the starts from the seed again.
         waited: where they waited for the ego to enter, if some were put elsewhere after that.
         departures: of the background; None for the scenario's own demand.
+        approaches: types of the site's approaches, among which the starts' places are numbered.
     """
 
     seed: int
@@ -41,6 +42,7 @@ class Recorded:
     starts: Sequence[StartRecord] = ()
     waited: Sequence[StartRecord] = ()
     departures: Demand | None = None
+    approaches: Sequence[str] = ()
 
     def memories(self, teams: Teams) -> tuple[dict[str, Any], ...]:
         """What the agents that play it back have to remember, as plain data."""
@@ -53,12 +55,11 @@ class Recorded:
             for team in teams
         )
 
-    def agents(self, teams: Teams, *, sees_background: bool = False) -> list[RecordedAgent]:
+    def agents(self, teams: Teams) -> list[RecordedAgent]:
         """The agents that play it back."""
         agents = [RecordedAgent() for _ in teams]
         for agent, memory in zip(agents, self.memories(teams), strict=True):
             agent.remember(memory)
-            agent.sees_background = sees_background
         return agents
 
 

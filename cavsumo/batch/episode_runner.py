@@ -21,7 +21,7 @@ from cavsumo.results.rows import Outcome, Row, verdicts_cell
 from cavsumo.results.traces import frame, origin, trace_head, trace_text
 from cavsumo.simulation.avoidability import Avoidability, AvoidabilityCheck
 from cavsumo.simulation.loop import Episode, play
-from cavsumo.simulation.playback import recorded
+from cavsumo.simulation.playback import played_back, recorded
 from cavsumo.simulation.setup import make_setup
 
 
@@ -75,27 +75,24 @@ class EpisodeRunner:
         begun = time.perf_counter()
         log = ""
         try:
-            agents = self._agents_of(job)
+            agents = self._cast(job)
             before = _recall(agents)
             own = job.simulation == "own"
             record = job.record or (self.plan.trace != "none" and own)
-            demand = job.recorded.departures if job.recorded else None
             retry = own and self.plan.reference != "none"
-            episode = play(
-                self.setup,
-                agents,
-                job.seed,
-                record=record,
-                keep=retry,
-                simulation=job.simulation,
-                demand=demand,
-            )
+            if job.recorded is not None:
+                episode = played_back(self.setup, job.recorded)
+            else:
+                how: dict[str, Any] = {"keep": retry, "simulation": job.simulation}
+                episode = play(self.setup, agents, job.seed, record=record, **how)
             memory = _recall(agents)
             row = head(self.plan, job) | measured(episode)
             log = self.setup.ego.take_log()
             if retry and episode.outcome == VIOLATED:
-                played = self.setup, agents, job.seed, record, episode
-                retrial = AvoidabilityCheck(*played, beat, demand)
+                demand = job.recorded.departures if job.recorded else None
+                retrial = AvoidabilityCheck(
+                    self.setup, agents, job.seed, record, episode, beat, demand
+                )
                 row |= self._avoidable(retrial)
             trace = self._trace(job, row, before, episode) if record else ""
         except Exception as error:  # whatever it is, it costs this row and no other
@@ -116,10 +113,6 @@ class EpisodeRunner:
             "margin_s": verdict.margin,
             "avoidable_note": verdict.note,
         }
-
-    def _agents_of(self, job: Job) -> Sequence[Agent]:
-        """Those who play a job."""
-        return self._cast(job) if job.recorded is None else job.recorded.agents(self.setup.teams)
 
     def _cast(self, job: Job) -> list[Agent]:
         """The agents of a job, with their memory."""

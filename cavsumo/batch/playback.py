@@ -22,17 +22,24 @@ NOT_PLAYED_BACK = frozenset(
 AGAIN = "playback"  # label of the agent in a plan that is played back
 
 
-def recording_of(trace: Trace, plan: BatchPlan) -> Recorded:
-    """What it takes to play the episode of a trace back.
+def recording_of(record: Record, trace: Trace) -> Recorded:
+    """What it takes to play an episode back, by its trace; raises ResultsError where it is damaged.
 
     A trace of format 1 holds no actions: those that lead from frame to frame are computed, which
-    is not always exact.
+    is not always exact, and the starts are drawn again.
     """
     if not trace.has_recording:
-        return Recorded(int(trace.row["seed"]), _between_frames(trace, plan))
-    found = trace.recording()
-    if len(found.starts) != plan.scenario.testers:
-        raise ResultsError(f"{len(found.starts)} starts of {plan.scenario.testers} testers")
+        return Recorded(int(trace.row["seed"]), _between_frames(trace, record.plan))
+    testers = record.plan.scenario.testers
+    try:
+        found = trace.recording()
+    except ResultsError as error:
+        raise ResultsError(f"{str(record.file)!r}: trace of run {record.run}: {error}") from error
+    if len(found.starts) != testers:
+        raise ResultsError(
+            f"{str(record.file)!r}: trace of run {record.run}: {len(found.starts)} starts of "
+            f"{testers} testers"
+        )
     return found
 
 
@@ -57,16 +64,10 @@ def for_playback(record: Record) -> Record:
 
     Raises InputError when it holds no actions.
     """
-    if record.trace is None:
-        raise InputError(f"--playback: no trace was kept of run {record.run}")
-    if not record.trace.has_recording:
-        raise InputError(
-            f"--playback: the trace of run {record.run} is of format 1, without actions"
-        )
-    scenario = record.plan.scenario
-    changed: dict[str, Any] = {"approaches": tuple(record.trace.head["approaches"])}
-    sums = dict(record.origin["sha256"])
-    if record.trace.head["departures"] is not None:
+    recorded, scenario = _recording(record), record.plan.scenario
+    changed: dict[str, Any] = {"approaches": tuple(recorded.approaches)}
+    sums = dict(record.origin.get("sha256") or {})
+    if recorded.departures is not None:
         changed |= {"routes": None, "traffic": None}
         for name in ("traffic", str(scenario.routes)):
             sums.pop(name, None)
@@ -84,9 +85,15 @@ def for_playback(record: Record) -> Record:
 
 def playback_job(record: Record) -> Job:
     """The job that plays a record back; the record is that of ``for_playback``."""
-    assert record.trace is not None
-    try:
-        recorded = recording_of(record.trace, record.plan)
-    except ResultsError as error:
-        raise ResultsError(f"{str(record.file)!r}: run {record.run}: {error}") from error
+    recorded = _recording(record)
     return Job(record.run, AGAIN, recorded.seed, record=True, recorded=recorded)
+
+
+def _recording(record: Record) -> Recorded:
+    """What a record is played back from; raises InputError when it holds no actions."""
+    run, trace = record.run, record.trace
+    if trace is None:
+        raise InputError(f"--playback: no trace was kept of run {run}")
+    if not trace.has_recording:
+        raise InputError(f"--playback: the trace of run {run} is of format 1, without actions")
+    return recording_of(record, trace)

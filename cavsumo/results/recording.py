@@ -31,6 +31,7 @@ class _Parts(BaseModel):
     starts: tuple[StartRecord, ...]
     waited: tuple[StartRecord, ...]
     departures: Demand | None
+    approaches: tuple[str, ...]
     actions: tuple[tuple[Action, ...], ...]
 
 
@@ -38,30 +39,37 @@ def recording_head(played: Recorded) -> dict[str, Any]:
     """What a trace's head holds of it; the actions are in the frames."""
     there = played.departures
     return {
+        "approaches": played.approaches,
         "starts": played.starts,
         "waited": played.waited,
         "departures": there and {"types": there.types, "trips": there.trips, "walks": there.walks},
     }
 
 
-def recording(head: Mapping[str, Any], frames: Sequence[Mapping[str, Any]], seed: int) -> Recorded:
+def recording(head: Mapping[str, Any], frames: Sequence[Mapping[str, Any]]) -> Recorded:
     """The record that a trace holds; raises ResultsError where it holds none."""
-    parts = {key: head.get(key) for key in ("starts", "waited", "departures")}
+    parts = {key: value for key, value in head.items() if key in _Parts.model_fields}
     parts["actions"] = [frame.get("actions") for frame in frames]
     try:
+        seed = int(head["row"]["seed"])
         found = _Parts.model_validate_json(json.dumps(parts))
     except ValidationError as error:
         problem = error.errors()[0]
         place = ".".join(map(str, problem["loc"]))
-        raise ResultsError(f"{place or 'head'}: {problem['msg']}") from error
+        raise ResultsError(f"{place}: {problem['msg']}") from error
+    except (KeyError, TypeError, ValueError) as error:
+        raise ResultsError("its head holds no row with a seed, or a number is too large") from error
     _check(found)
     actions = found.actions if found.actions[-1] else found.actions[:-1]
-    return Recorded(seed, actions, found.starts, found.waited, found.departures)
+    starts = found.starts, found.waited
+    return Recorded(seed, actions, *starts, found.departures, found.approaches)
 
 
 def _check(found: _Parts) -> None:
     """Raise ResultsError unless the parts fit each other and name nothing but plain values."""
     testers = len(found.starts)
+    if not found.actions:
+        raise ResultsError("it has no frames")
     if not testers or len(found.waited) not in (0, testers):
         raise ResultsError(f"{testers} starts and {len(found.waited)} places to wait at")
     for step, joint in enumerate(found.actions):

@@ -68,10 +68,7 @@ class Trace:
 
     def recording(self) -> Recorded:
         """What it takes to play the episode back; raises ResultsError where that is damaged."""
-        try:
-            return recording(self.head, self.frames, int(self.row["seed"]))
-        except (KeyError, ValueError, TypeError) as error:
-            raise ResultsError("the head has no row with a seed") from error
+        return recording(self.head, self.frames)
 
     @property
     def row(self) -> dict[str, str]:
@@ -96,7 +93,6 @@ def origin(plan: BatchPlan, site: Site, inputs: Mapping[str, str] | None = None)
         "sha256": known | traffic_checksum(site),
         "versions": versions(),
         "sumo_options": dict(OPTIONS),
-        "approaches": list(dict.fromkeys(approach.type for approach in site.approaches)),
     }
 
 

@@ -225,12 +225,9 @@ def play(
     record: bool = False,
     keep: bool = False,
     simulation: Simulation = "own",
-    demand: Demand | None = None,
 ) -> Episode:
     """A whole episode; the arguments are those of ``EpisodeLoop``."""
-    loop = EpisodeLoop(
-        setup, agents, seed, record=record, keep=keep, simulation=simulation, demand=demand
-    )
+    loop = EpisodeLoop(setup, agents, seed, record=record, keep=keep, simulation=simulation)
     while not loop.over:
         loop.step()
     return loop.finished()

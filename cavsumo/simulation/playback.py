@@ -28,6 +28,7 @@ def recorded(setup: Setup, episode: Episode, seed: int, departures: Demand | Non
         [start_record(setup.site, start) for start in episode.starts],
         [start_record(setup.site, start) for start in episode.waited],
         departures,
+        tuple(dict.fromkeys(approach.type for approach in setup.site.approaches)),
     )
 
 
@@ -55,3 +56,11 @@ def playback(
     for agent, other in zip(agents, alike, strict=bool(alike)):
         agent.sees_background = other.sees_background
     return EpisodeLoop(setup, agents, played.seed, record=record, demand=played.departures)
+
+
+def played_back(setup: Setup, played: Recorded) -> Episode:
+    """A recorded episode played again as a whole, every snapshot and action kept."""
+    loop = playback(setup, played, record=True)
+    while not loop.over:
+        loop.step()
+    return loop.finished()

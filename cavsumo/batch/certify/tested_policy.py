@@ -79,10 +79,9 @@ def of_run(record: Record, params: Params, *, kept: bool, open_loop: bool) -> Su
     if open_loop:
         if params:
             raise InputError("--open-loop: the recorded actions have no parameters")
-        again, trace = f"run{record.run}", _trace(record)
-        played = recording_of(trace, plan)
+        again, played = f"run{record.run}", recording_of(record, _trace(record))
         memory = {again: played.memories(teams(plan.scenario))}
-        own |= {"told": played.starts, "approaches": trace.head.get("approaches", ())}
+        own |= {"told": played.starts, "approaches": played.approaches}
         return Subject(f"{words}, open loop", f"{again}=recorded", {}, memory, **own)
     memory = {label: found} if (found := _known_before(record)) is not None else {}
     return Subject(words, _word(plan, label), _params(plan, label) | params, memory, **own)
