@@ -12,7 +12,7 @@ import itertools
 import json
 import math
 import re
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence, Set
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -189,18 +189,20 @@ class UnknownFormat(ValueError):
 def parsed(text: str) -> Trace:
     """The trace that a text holds; raises ValueError and the like when it holds none."""
     first, *lines = text.splitlines() or [""]
-    found = json.loads(first)
+    head = _head(first)
+    keys = FRAME_KEYS if head["format"] == FORMATS[0] else FRAME_KEYS | {"actions"}
+    return Trace(head, [_frame(line, keys) for line in lines])
+
+
+def _head(line: str) -> dict[str, Any]:
+    """The first line of a trace; raises UnknownFormat for a format that is not read."""
+    found = json.loads(line)
     if not (isinstance(found, dict) and isinstance(found.get("format"), str)):
         raise ValueError("line 1 is not the head of a trace")
-    _check_format(found["format"])
-    return Trace(found, [_frame(line) for line in lines])
-
-
-def _check_format(found: str) -> None:
-    """Raise UnknownFormat for a format that is not read."""
-    if found not in FORMATS:
-        known = " and ".join(FORMATS)
-        raise UnknownFormat(f"format {found[:40].strip()}, this version reads {known}")
+    if found["format"] not in FORMATS:
+        said, known = " ".join(found["format"].split())[:40], " and ".join(FORMATS)
+        raise UnknownFormat(f"format {said}, this version reads {known}")
+    return found
 
 
 def read_moments(file: Path, times: Sequence[float]) -> list[tuple[float, dict[str, Any]]]:
@@ -210,12 +212,15 @@ def read_moments(file: Path, times: Sequence[float]) -> list[tuple[float, dict[s
     """
     try:
         with file.open(encoding="utf-8") as stream:
-            lines = stream.readlines()[1:]  # the first is the head
+            first, *lines = stream.readlines() or [""]
+        _head(first)
         passing = list(map(_passing, lines))
         steps = (math.dist(a[1:], b[1:]) for a, b in itertools.pairwise(passing))
         driven = list(itertools.accumulate(steps, initial=0.0))
         nearest = [min(range(len(lines)), key=lambda i: abs(passing[i][0] - t)) for t in times]
         return [(driven[i], _frame(lines[i])) for i in nearest]
+    except UnknownFormat as error:
+        raise ResultsError(f"trace {str(file)!r}: {error}") from error
     except (OSError, ValueError, TypeError) as error:
         raise ResultsError(f"trace {str(file)!r}: cannot be read: {error}") from error
 
@@ -232,12 +237,21 @@ def _passing(line: str) -> tuple[float, float, float]:
     return time, x, y
 
 
-def _frame(line: str) -> dict[str, Any]:
-    """A line of a trace."""
+def _frame(line: str, keys: Set[str] = FRAME_KEYS) -> dict[str, Any]:
+    """A line of a trace, which has at least some keys."""
     found: dict[str, Any] = json.loads(line)
-    if not set(found) >= FRAME_KEYS:
-        raise ValueError(f"a frame without {', '.join(sorted(FRAME_KEYS - set(found)))}")
+    if not found.keys() >= keys:
+        raise ValueError(f"a frame without {', '.join(sorted(keys - found.keys()))}")
     for _, name, state in states(found):
-        if len(state) != 4 or not all(isinstance(value, int | float) for value in state):
+        if not _numbers(state, 4):
             raise ValueError(f"step {found['step']}: {name} is {state!r}, expected [x, y, v, o]")
+    for action in found["actions"] if "actions" in keys else ():
+        if not _numbers(action, 2):
+            said = f"action {action!r}, expected [throttle, steering]"
+            raise ValueError(f"step {found['step']}: {said}")
     return found
+
+
+def _numbers(found: Any, count: int) -> bool:
+    """Whether something is so many numbers."""
+    return len(found) == count and all(isinstance(value, int | float) for value in found)
