@@ -180,7 +180,12 @@ def _file(record: Record, option: str, was: Path, given: Path | None) -> Path:
     if given:
         raise InputError(f"{option}: no such file: {str(given)!r}")
     how = f"name it with {option} FILE or put it" if option.startswith("--") else "put it"
-    raise InputError(f"{str(record.file)!r} needs {what}, which is not here; {how} beside it")
+    without = ""
+    if option == "--routes" and record.trace is not None and record.trace.has_recording:
+        without = ", or play back who departed with --playback"
+    raise InputError(
+        f"{str(record.file)!r} needs {what}, which is not here; {how} beside it{without}"
+    )
 
 
 # Played again

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import dataclasses
 import sys
 from dataclasses import dataclass
 from pathlib import Path
 
 from cavsumo.batch.playback import NOT_PLAYED_BACK, for_playback, playback_job
-from cavsumo.batch.prepared import manifest
+from cavsumo.batch.prepared import PreparedBatch, manifest
 from cavsumo.batch.replay import (
     Record,
     compare,
@@ -70,12 +71,16 @@ def replay(file: Path, wanted: ReplayOptions = ReplayOptions()) -> int:
         check_gui(wanted.delay)
     if wanted.playback and wanted.recorded:
         raise InputError("replay: --recorded plays nothing and --playback plays; name one of them")
-    record = _record(file, wanted)
+    found = _found(file, wanted)
+    record = _located(for_playback(found) if wanted.playback else found, file, wanted)
     if wanted.recorded:
         trace: Trace | None = _recorded_trace(record)
         site = shown_site(record.plan, trace) if wanted.shown else None
+    elif wanted.playback:
+        trace, site = record.trace, _played_back(record)
+        record = _as_it_was(record, found)
     else:
-        trace, site = _played(record, wanted.playback)
+        trace, site = _played(record)
     if wanted.shown and trace is None:
         raise InputError(f"replay: run {record.run} ended in an error, there is nothing to show")
     if trace is not None and site is not None:
@@ -83,20 +88,21 @@ def replay(file: Path, wanted: ReplayOptions = ReplayOptions()) -> int:
     return Exit.OK
 
 
-def _record(file: Path, wanted: ReplayOptions) -> Record:
-    """The episode that is meant, with its files."""
+def _found(file: Path, wanted: ReplayOptions) -> Record:
+    """The episode that is meant."""
     allowed = None if wanted.trust else ()
     if file.suffix == TRACE:
         if wanted.run is not None:
             raise InputError(f"replay: {str(file)!r} is the trace of one episode; no run is named")
-        record = recorded_alone(file, allowed, anew=not wanted.playback)
-        record = for_playback(record) if wanted.playback else record
-        return located(record, wanted.net, wanted.routes)
+        return recorded_alone(file, allowed, anew=not wanted.playback)
     if wanted.run is None:
         raise InputError(f"replay: which run of {str(file)!r}? name its number")
-    record = recorded(file, wanted.run, allowed)
-    record = for_playback(record) if wanted.playback else record
-    if wanted.net or wanted.routes:
+    return recorded(file, wanted.run, allowed)
+
+
+def _located(record: Record, file: Path, wanted: ReplayOptions) -> Record:
+    """An episode with its files where they are here; those of results are where they were."""
+    if file.suffix == TRACE or wanted.net or wanted.routes:
         return located(record, wanted.net, wanted.routes)
     return record
 
@@ -109,21 +115,48 @@ def _recorded_trace(record: Record) -> Trace:
     return record.trace
 
 
-def _played(record: Record, playback: bool) -> tuple[Trace | None, Site]:
-    """The recorded episode played again or back, None where an error left none; and where."""
-    job = playback_job(record) if playback else None
+def _played(record: Record) -> tuple[Trace | None, Site]:
+    """The trace of the episode played again, None where an error left none; and where it was."""
+    prepared = _prepared(record)
+    with Worker(prepared) as worker:
+        again = replayed(worker, record)
+    compare(record, again)
+    _say(record, "the same")
+    return parsed(again.trace) if again.trace else None, prepared.site
+
+
+def _played_back(record: Record) -> Site:
+    """Play an episode back; where it was."""
+    job, prepared = playback_job(record), _prepared(record)
+    with Worker(prepared) as worker:
+        again, _ = worker.play(job)
+    compare(record, again, NOT_PLAYED_BACK)
+    _say(record, "the same, played back")
+    return prepared.site
+
+
+def _prepared(record: Record) -> PreparedBatch:
+    """What plays a record; what has changed since is said on stderr."""
     prepared = prepared_again(record)
     for change in changes(record.origin, manifest(prepared)):
         print(f"cavsumo: {change}", file=sys.stderr)
-    with Worker(prepared) as worker:
-        again = replayed(worker, record) if job is None else worker.play(job)[0]
-    compare(record, again, NOT_PLAYED_BACK if playback else ())
+    return prepared
+
+
+def _say(record: Record, how: str) -> None:
+    """One line of what was compared."""
     frames = record.trace.frames if record.trace is not None else None
     compared = f"{len(frames)} frames" if frames is not None else "its row (no trace was kept)"
     row = record.row
-    how = ", played back" if playback else ""
-    print(f"run {record.run} ({row['agent']}): {row['outcome']}, {compared}: the same{how}")
-    return parsed(again.trace) if again.trace else None, prepared.site
+    print(f"run {record.run} ({row['agent']}): {row['outcome']}, {compared}: {how}")
+
+
+def _as_it_was(record: Record, found: Record) -> Record:
+    """An episode that was played back with the plan that was recorded, its files where they are."""
+    here = {key: getattr(record.plan.scenario, key) for key in ("net", "additional")}
+    scenario = found.plan.scenario.model_copy(update=here)
+    plan = found.plan.model_copy(update={"scenario": scenario})
+    return dataclasses.replace(found, plan=plan)
 
 
 def _show(site: Site, record: Record, trace: Trace, wanted: ReplayOptions) -> None:
