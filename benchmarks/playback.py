@@ -21,9 +21,9 @@ from pathlib import Path
 from typing import Any
 
 from cavsumo.batch.executors import Means
-from cavsumo.batch.playback import NOT_PLAYED_BACK, for_playback, playback_job
+from cavsumo.batch.playback import NOT_PLAYED_BACK, for_playback, playback_job, played_back
 from cavsumo.batch.preflight import Manner
-from cavsumo.batch.replay import Record, compare, located, prepared_again, recorded_alone
+from cavsumo.batch.replay import Record, Replayed, compare, located, prepared_again, recorded_alone
 from cavsumo.batch.worker import Worker
 from cavsumo.cli.commands.run import run
 from cavsumo.errors import DivergenceError
@@ -78,7 +78,7 @@ def main() -> None:
     with tempfile.TemporaryDirectory() as folder:
         for i, name in enumerate(BATCHES):
             counts = [0, 0, 0, 0]
-            for one in played_back(name, options, Path(folder) / str(i)):
+            for one in batch_played_back(name, options, Path(folder) / str(i)):
                 counts = [a + b for a, b in zip(counts, one, strict=True)]
             show(name, counts)
             whole = [a + b for a, b in zip(whole, counts, strict=True)]
@@ -87,7 +87,7 @@ def main() -> None:
     sys.exit(whole[0] != whole[3])
 
 
-def played_back(
+def batch_played_back(
     name: str, options: argparse.Namespace, folder: Path
 ) -> Iterator[tuple[int, int, int, int]]:
     """A batch, each trace played back alone: episodes, frames, departures, those that are same."""
@@ -101,7 +101,7 @@ def played_back(
             if departures is None:
                 raise SystemExit(f"{name}: departures do not tell all of its demand")
             number = len(departures.trips) + len(departures.walks)
-            same = is_same(name, record, worker.play(job)[0])
+            same = is_same(name, record, played_back(worker, record))
             yield 1, len(record.trace.frames), number, int(same)
 
 
@@ -132,7 +132,7 @@ def alone(trace: Path, folder: Path) -> Record:
     return located(record, None, None)
 
 
-def is_same(name: str, record: Record, again: Any) -> bool:
+def is_same(name: str, record: Record, again: Replayed) -> bool:
     """Whether a playback is the recorded episode; what differs is printed."""
     try:
         compare(record, again, NOT_PLAYED_BACK)

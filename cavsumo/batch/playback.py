@@ -8,11 +8,12 @@ from typing import Any
 from cavsumo.agents.casting import tester_bodies
 from cavsumo.agents.recorded import Recorded, action_between
 from cavsumo.batch.jobs import Job
-from cavsumo.batch.replay import Record
+from cavsumo.batch.replay import Record, Replayed
+from cavsumo.batch.worker import Worker
 from cavsumo.errors import InputError, ResultsError
 from cavsumo.model.bodies import Action
 from cavsumo.model.scenario import BatchPlan
-from cavsumo.results.traces import Trace
+from cavsumo.results.traces import Trace, parsed
 
 # Columns of which the agents and the reruns decide, so that a playback does not reproduce them.
 NOT_PLAYED_BACK = frozenset(
@@ -81,6 +82,12 @@ def for_playback(record: Record) -> Record:
         }
     )
     return dataclasses.replace(record, plan=plan, origin={**record.origin, "sha256": sums})
+
+
+def played_back(worker: Worker, record: Record) -> Replayed:
+    """An episode played back by a worker of its plan; the record is that of ``for_playback``."""
+    outcome = worker.play(playback_job(record)).outcome
+    return Replayed(outcome.row, parsed(outcome.trace) if outcome.trace else None)
 
 
 def playback_job(record: Record) -> Job:

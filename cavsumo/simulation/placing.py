@@ -50,7 +50,7 @@ def placed(
     if starts:
         return Placed(starts, (), reset(_states(setup, starts), starts))
     kinds = [body.kind for body in setup.bodies]
-    drawn = setup.site.draw(kinds, setup.world.ego_body.kind, setup.start_speed, rng)
+    drawn = setup.site.draw(kinds, setup.world.ego_body.kind, setup.scenario.start_speed, rng)
     snapshot = reset(_states(setup, drawn), drawn)
     return _cleared(setup, drawn, snapshot, rng)
 
@@ -81,11 +81,12 @@ def _told(setup: Setup, records: Sequence[Sequence[StartRecord]]) -> Starts:
 
 def _states(setup: Setup, starts: Sequence[Start]) -> list[BodyState]:
     """The testers' first states."""
+    wanted = setup.scenario.start_speed
 
     def speed(kind: Kind, start: Start) -> float:
         if start.v is not None:
             return start.v
-        return kind.v_max if setup.start_speed is None else min(kind.v_max, setup.start_speed)
+        return kind.v_max if wanted is None else min(kind.v_max, wanted)
 
     return [
         BodyState(body, start.x, start.y, speed(body.kind, start), start.o)

@@ -150,7 +150,7 @@ def trace_file(set_up: SetUp, tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The trace of an episode with traffic."""
     file = tmp_path_factory.mktemp("trace") / "run000001.jsonl"
     with EpisodeRunner(set_up("crossing", routes="auto", trace="all")) as runner:
-        file.write_text(runner.play(job(runner.plan, 1))[0].trace, encoding="utf-8")
+        file.write_text(runner.play(job(runner.plan, 1)).outcome.trace, encoding="utf-8")
     return file
 
 
@@ -162,7 +162,7 @@ def test_a_trace_is_played_back_without_agent_and_demand(trace_file: Path) -> No
     assert record.plan.agents == ("playback=recorded",)
     assert not any(name.endswith(".rou.xml") for name in record.origin["sha256"])
     with EpisodeRunner(prepare(record.plan)) as runner:
-        again = parsed(runner.play(playback_job(record))[0].trace)
+        again = parsed(runner.play(playback_job(record)).outcome.trace)
     assert record.trace
     assert again.frames == record.trace.frames
     for part in ("starts", "waited", "departures", "approaches", "bodies"):

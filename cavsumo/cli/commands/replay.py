@@ -7,7 +7,7 @@ import sys
 from dataclasses import dataclass
 from pathlib import Path
 
-from cavsumo.batch.playback import NOT_PLAYED_BACK, for_playback, playback_job
+from cavsumo.batch.playback import NOT_PLAYED_BACK, for_playback, played_back
 from cavsumo.batch.prepared import PreparedBatch, manifest
 from cavsumo.batch.replay import (
     Record,
@@ -24,7 +24,7 @@ from cavsumo.errors import Exit, InputError
 from cavsumo.interop.fcd import write_fcd
 from cavsumo.network.site import Site
 from cavsumo.results.provenance import changes
-from cavsumo.results.traces import Trace, parsed
+from cavsumo.results.traces import Trace
 
 TRACE = ".jsonl"  # how the name of a trace ends
 
@@ -122,14 +122,14 @@ def _played(record: Record) -> tuple[Trace | None, Site]:
         again = replayed(worker, record)
     compare(record, again)
     _say(record, "the same")
-    return parsed(again.trace) if again.trace else None, prepared.site
+    return again.trace, prepared.site
 
 
 def _played_back(record: Record) -> Site:
     """Play an episode back; where it was."""
-    job, prepared = playback_job(record), _prepared(record)
+    prepared = _prepared(record)
     with Worker(prepared) as worker:
-        again, _ = worker.play(job)
+        again = played_back(worker, record)
     compare(record, again, NOT_PLAYED_BACK)
     _say(record, "the same, played back")
     return prepared.site
