@@ -1,6 +1,6 @@
 """Recorded episodes, played back from their traces alone: is every frame the same?
 
-    python benchmarks/playback.py [--runs 25] [--seed N]
+    python benchmarks/playback.py [--runs 25] [--seed N] [--batch NAME]
 
 Batches with traffic are played into a temporary folder, on the networks that come with cavsumo:
 pedestrians and vehicles as testers, SUMO's driver and controllers, drawn traffic, and a demand of
@@ -71,12 +71,13 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--runs", type=int, default=25, help="episodes of each batch")
     parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--batch", choices=BATCHES, action="append", help="only this one")
     options = parser.parse_args()
     print(f"{'batch':32}{'episodes':>10}{'frames':>10}{'departures':>12}{'the same':>10}")
     whole = [0, 0, 0, 0]
     begun = time.perf_counter()
     with tempfile.TemporaryDirectory() as folder:
-        for i, name in enumerate(BATCHES):
+        for i, name in enumerate(options.batch or BATCHES):
             counts = [0, 0, 0, 0]
             for one in batch_played_back(name, options, Path(folder) / str(i)):
                 counts = [a + b for a, b in zip(counts, one, strict=True)]

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import dataclasses
+import sys
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
+from support import benchmark
 
 from cavsumo.agents.recorded import Recorded
 from cavsumo.batch.episode_runner import EpisodeRunner
@@ -186,6 +188,25 @@ def test_the_actions_of_format_1_are_computed(trace_file: Path) -> None:
                 assert b == pytest.approx(a, abs=1e-6)
     with pytest.raises(InputError, match="format 1, without actions"):
         for_playback(dataclasses.replace(record, trace=old))
+
+
+def test_the_benchmark_finds_no_difference(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """At its smallest size, with the demand that draws most; it finds one that is made."""
+    playback = benchmark("playback")
+    words = ["playback.py", "--runs", "1", "--batch", "pedestrians, flows"]
+    monkeypatch.setattr(sys, "argv", words)
+    with pytest.raises(SystemExit) as done:
+        playback.main()
+    assert done.value.code == 0
+    all_of_it = capsys.readouterr().out.splitlines()[-2].split()
+    assert (all_of_it[0], all_of_it[1], all_of_it[-1]) == ("all", "1", "1")
+    assert int(all_of_it[3]) > 0
+    monkeypatch.setattr(playback, "is_same", lambda *_: False)
+    with pytest.raises(SystemExit) as done:
+        playback.main()
+    assert done.value.code == 1
 
 
 # Demands
