@@ -9,6 +9,7 @@ import numpy as np
 
 from cavsumo.agents.names import AGENT_NAMES
 from cavsumo.model.bodies import NOOP, Action, Kind
+from cavsumo.model.carriageway import StartRecord
 from cavsumo.model.registry import Registry
 from cavsumo.model.scene import Scene
 from cavsumo.model.snapshot import BodyState, Snapshot
@@ -46,6 +47,8 @@ class Agent:
         promise: against whom its forecasts hold; empty for agents that make none.
         manoeuvre: the one manoeuvre that its vehicles are asked to do (``manoeuvres.MANOEUVRES``):
             they start where it is possible; "auto" for whichever is possible where they start.
+        recorded_starts: where its bodies start, for an agent that plays back; empty to draw it.
+        recorded_waits: where they wait until the ego has entered; empty for where they start.
         FILES: its parameters that name files; their checksums are noted with the results.
     """
 
@@ -56,6 +59,8 @@ class Agent:
     drives: bool = True
     promise: str = ""
     manoeuvre: str = "auto"
+    recorded_starts: Sequence[StartRecord] = ()
+    recorded_waits: Sequence[StartRecord] = ()
 
     scene: Scene
     owned: tuple[int, ...]

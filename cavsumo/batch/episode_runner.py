@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import time
 from collections.abc import Callable, Sequence
 from functools import cached_property
@@ -22,6 +23,7 @@ from cavsumo.results.rows import Outcome
 from cavsumo.results.traces import frame, origin, trace_head, trace_text
 from cavsumo.simulation.avoidability import AvoidabilityCheck
 from cavsumo.simulation.loop import Episode, play
+from cavsumo.simulation.playback import played_back, recorded
 from cavsumo.simulation.setup import make_setup
 
 
@@ -70,14 +72,19 @@ class EpisodeRunner:
             own = job.simulation == "own"
             record = job.record or (self.plan.trace != "none" and own)
             retry = own and self.plan.reference != "none"
-            episode = play(
-                self.setup, agents, job.seed, record=record, keep=retry, simulation=job.simulation
-            )
+            if job.recorded is not None:
+                episode = played_back(self.setup, job.recorded)
+            else:
+                how: dict[str, Any] = {"keep": retry, "simulation": job.simulation}
+                episode = play(self.setup, agents, job.seed, record=record, **how)
             memory = _recall(agents)
             log = self.setup.ego.take_log()
             avoidability = None
             if retry and episode.outcome == VIOLATED:
-                retrial = AvoidabilityCheck(self.setup, agents, job.seed, record, episode, beat)
+                demand = job.recorded.departures if job.recorded else None
+                retrial = AvoidabilityCheck(
+                    self.setup, agents, job.seed, record, episode, beat, demand
+                )
                 avoidability = retrial.judged(REFERENCES.make(self.plan.reference, {}))
             row = row_of(finished(self.plan, job, episode, avoidability))
             trace = self._trace(job, row, before, episode) if record else ""
@@ -109,10 +116,12 @@ class EpisodeRunner:
 
     def _trace(self, job: Job, row: Row, memory: Any, episode: Episode) -> str:
         """The frames worth keeping: of tests found, or of every episode if asked."""
-        if episode.frames and (job.record or episode.judgement.triggered):
-            first = trace_head(self._origin, row, memory, episode.frames)
-            return trace_text(first, map(frame, episode.frames))
-        return ""
+        if not (episode.frames and (job.record or episode.judgement.triggered)):
+            return ""
+        played = recorded(self.setup, episode, job.seed, episode.departures)
+        first = trace_head(self._origin, row, memory, episode.frames, played)
+        frames = itertools.zip_longest(episode.frames, played.actions, fillvalue=())
+        return trace_text(first, itertools.starmap(frame, frames))
 
 
 def _recall(agents: Sequence[Agent]) -> Memory | None:

@@ -8,6 +8,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
+from cavsumo.agents.recorded import Recorded
 from cavsumo.model.labels import labelled
 from cavsumo.model.scenario import BatchPlan, Simulation
 from cavsumo.model.seeds import episode_seed
@@ -33,6 +34,7 @@ class Job:
         memory: what the agents learned in earlier episodes; None for nothing.
         record: keep the frames whatever happens.
         simulation: "own", or "new" to start one that later jobs share as the "same".
+        recorded: an episode to play back instead of asking the agents; None to ask them.
     """
 
     run: int
@@ -41,6 +43,7 @@ class Job:
     memory: Memory | None = None
     record: bool = False
     simulation: Simulation = "own"
+    recorded: Recorded | None = None
 
 
 def job(plan: BatchPlan, run: int, memory: Memory | None = None) -> Job:

@@ -15,6 +15,7 @@ from cavsumo.batch.prepared import PreparedBatch, prepare
 from cavsumo.batch.trust import check_trust
 from cavsumo.batch.worker import Worker, search
 from cavsumo.errors import DivergenceError, InputError, ResultsError
+from cavsumo.model.bodies import STEERING, THROTTLE
 from cavsumo.model.checksums import checksum
 from cavsumo.model.named_networks import check_network, network_file, routes_file
 from cavsumo.model.scenario import BatchPlan, Scenario
@@ -106,8 +107,13 @@ def recorded_row(csv_file: Path, run: int) -> dict[str, str]:
     return rows[str(run)]
 
 
-def recorded_alone(file: Path, allowed: Collection[str] | None = ()) -> Record:
-    """The episode in a trace; raises ResultsError when it cannot be played from that alone."""
+def recorded_alone(
+    file: Path, allowed: Collection[str] | None = (), *, anew: bool = True
+) -> Record:
+    """The episode in a trace; raises ResultsError when it cannot be played from that alone.
+
+    ``anew``: whether its agents are to play, and not only what they did.
+    """
     trace, name = read_trace(file), f"trace {str(file)!r}"
     head = trace.head
     try:
@@ -123,10 +129,10 @@ def recorded_alone(file: Path, allowed: Collection[str] | None = ()) -> Record:
             f"{name}: was played in a simulation that other episodes used before; replay it from "
             "its results"
         )
-    if not kept:
+    if anew and not kept:
         raise ResultsError(
             f"{name}: does not hold what agent {row['agent']} had learned before, which is large; "
-            "replay it from its results"
+            "replay it from its results, or play it back with --playback"
         )
     return Record(plan, row, trace, head, file, alone=True, allowed=allowed)
 
@@ -182,7 +188,12 @@ def _file(record: Record, option: str, was: Path, given: Path | None) -> Path:
     if given:
         raise InputError(f"{option}: no such file: {str(given)!r}")
     how = f"name it with {option} FILE or put it" if option.startswith("--") else "put it"
-    raise InputError(f"{str(record.file)!r} needs {what}, which is not here; {how} beside it")
+    without = ""
+    if option == "--routes" and record.trace is not None and record.trace.has_recording:
+        without = ", or play back who departed with --playback"
+    raise InputError(
+        f"{str(record.file)!r} needs {what}, which is not here; {how} beside it{without}"
+    )
 
 
 # Played again
@@ -230,15 +241,18 @@ def known(worker: Worker, run: int) -> Memory | None:
 # Compared
 
 
-def compare(record: Record, again: Replayed) -> None:
-    """Raise DivergenceError at the first difference of a replay from its record."""
+def compare(record: Record, again: Replayed, apart: Collection[str] = ()) -> None:
+    """Raise DivergenceError at the first difference of a replay from its record.
+
+    ``apart``: columns of the row that it need not reproduce.
+    """
     name = f"run {record.run} ({record.row['agent']})"
     if again.row["outcome"] == "error" != record.row["outcome"]:
         said = f"{name} could not be played again: {again.row['error']}"
         raise DivergenceError(said, None, "", "outcome")
     frames = record.trace.frames if record.trace is not None else None
     frames_again = again.trace.frames if again.trace is not None else ()
-    found = first_difference(record.row, frames, again.row, frames_again)
+    found = first_difference(record.row, frames, again.row, frames_again, apart)
     if found is not None:
         place, what, step, body, quantity = found
         raise DivergenceError(f"{name} diverged at {place}: {what}", step, body, quantity)
@@ -249,6 +263,7 @@ def first_difference(
     frames: Sequence[Mapping[str, Any]] | None,
     again: Row,
     frames_again: Sequence[Mapping[str, Any]],
+    apart: Collection[str] = (),
 ) -> Difference | None:
     """Where a replay departs from the record: the timestep, the body and the quantity."""
     if frames is not None:
@@ -260,7 +275,9 @@ def first_difference(
             what = f"{len(frames)} frames were recorded, {len(frames_again)} replayed"
             return Difference("the end of the trace", what, end, quantity="frames")
     for column in COLUMNS:
-        if column in NOT_REPLAYED or column not in row:  # of a version before it had the column
+        if column not in row:  # of a version before it had the column
+            continue
+        if column in NOT_REPLAYED or column in apart:
             continue
         if row[column] != cell(again.get(column)):
             what = f"recorded {row[column]!r}, replayed {cell(again.get(column))!r}"
@@ -286,3 +303,19 @@ def _frame_differences(old: Mapping[str, Any], new: Mapping[str, Any]) -> Iterat
             if a != b:
                 what = f"{body}.{name} recorded {a!r}, replayed {b!r}"
                 yield Difference(place, what, step, body, name)
+    yield from _action_differences(old, new, place)
+
+
+def _action_differences(
+    old: Mapping[str, Any], new: Mapping[str, Any], place: str
+) -> Iterator[Difference]:
+    """The differences of what the testers did; a trace of format 1 does not tell."""
+    chosen, chosen_again = old.get("actions", new["actions"]), new["actions"]
+    if len(chosen) != len(chosen_again):
+        what = f"{len(chosen)} actions were recorded, {len(chosen_again)} replayed"
+        yield Difference(place, what, old["step"], quantity="actions")
+    for body, one, again in zip(old["testers"], chosen, chosen_again, strict=False):
+        for name, a, b in zip((THROTTLE, STEERING), one, again, strict=True):
+            if a != b:
+                what = f"{body}.{name} recorded {a!r}, replayed {b!r}"
+                yield Difference(place, what, old["step"], body, name)

@@ -160,6 +160,27 @@ class Start:
     v: float | None = None
 
 
+class StartRecord(NamedTuple):
+    """A start as plain data; what belongs to the site is named by its number there.
+
+    Attributes:
+        x, y, o, v: as of a Start.
+        place: number of the site's area that the body starts on, or of the approach that it drives
+            on; None for neither.
+        lateral, forwards: as of a Start.
+        edges: of the walk or of the approach, by which the place is known again.
+    """
+
+    x: float
+    y: float
+    o: float
+    v: float | None = None
+    place: int | None = None
+    lateral: float = 0.0
+    forwards: bool = True
+    edges: tuple[str, ...] = ()
+
+
 class Roads:
     """The carriageways of a network.
 

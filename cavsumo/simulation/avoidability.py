@@ -11,21 +11,23 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 from cavsumo.agents.base import Agent
-from cavsumo.agents.recorded import RecordedAgent
+from cavsumo.agents.recorded import Recorded
 from cavsumo.assertions.base import VIOLATED, Assertion, Judgement
 from cavsumo.assertions.contacts import STANDING_MPS, Contact
 from cavsumo.egos.reference import Reference
 from cavsumo.egos.reference.encounter import encounter
 from cavsumo.egos.reference.takeover import Takeover
 from cavsumo.errors import CavsumoError
-from cavsumo.model.bodies import Action
+from cavsumo.model.departures import Demand
 from cavsumo.model.scene import Scene
 from cavsumo.model.snapshot import BodyState, Snapshot
 from cavsumo.model.zone_presence import is_vehicle, ran_into
 from cavsumo.simulation.avoidability_guess import foreseen
-from cavsumo.simulation.loop import Episode, EpisodeLoop
+from cavsumo.simulation.loop import Episode
+from cavsumo.simulation.playback import playback, recorded
 from cavsumo.simulation.setup import Setup
 
 MOST_RERUNS = 6  # a handful; a search that needs more says how far it came
@@ -92,6 +94,8 @@ class AvoidabilityCheck:
         setup, agents, seed: with which it was played.
         record: whether everybody was shown in its snapshots.
         episode: what happened; its frames and actions were kept.
+        demand: the departures with which it was played; None for the scenario's own demand, which
+            goes on where a rerun outlasts the episode.
         beat: called before each rerun, so that whoever waits knows that it goes on.
     """
 
@@ -101,6 +105,7 @@ class AvoidabilityCheck:
     record: bool
     episode: Episode
     beat: Callable[[], None]
+    demand: Demand | None = None
 
     @property
     def broken(self) -> Assertion:
@@ -206,7 +211,7 @@ class AvoidabilityCheck:
         record = self.record or any(a.sees_background for a in self.setup.assertions)
         ego = Takeover(self.setup.ego, reference, step, drives=episode.drives)
         setup = dataclasses.replace(self.setup, ego=ego, assertions=(broken, watch))
-        rerun = EpisodeLoop(setup, self._playbacks(), self.seed, record=record)
+        rerun = playback(setup, self._recorded, record=record, alike=self.agents)
         by_contact = episode.judgement.impact_speed is not None
         while True:
             now = rerun.snapshot
@@ -227,20 +232,10 @@ class AvoidabilityCheck:
         what = "the ego" if now.ego != recorded.ego else "somebody"
         raise Diverged(f"the episode again is another one: {what} differs at {now.time:.2f} s")
 
-    def _playbacks(self) -> list[RecordedAgent]:
-        """The agents, as they acted."""
-        return [
-            _again([joint[i] for joint in self.episode.actions], agent)
-            for i, agent in enumerate(self.agents)
-        ]
-
-
-def _again(chosen: Sequence[Sequence[Action]], agent: Agent) -> RecordedAgent:
-    """An agent that does again what another did, and looks where that one looked."""
-    again = RecordedAgent()
-    again.remember(chosen)
-    again.sees_background = agent.sees_background
-    return again
+    @cached_property
+    def _recorded(self) -> Recorded:
+        """The episode, to be played back."""
+        return recorded(self.setup, self.episode, self.seed, self.demand)
 
 
 def latest(

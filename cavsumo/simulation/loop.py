@@ -21,8 +21,9 @@ from cavsumo.assertions.naturalness import Naturalness
 from cavsumo.assertions.validity import Breach, ValidityMonitor
 from cavsumo.egos.base import Drive, Ego
 from cavsumo.errors import AgentError
-from cavsumo.model.bodies import Action, Kind
+from cavsumo.model.bodies import Action
 from cavsumo.model.carriageway import Start
+from cavsumo.model.departures import Demand
 from cavsumo.model.kinematics import step_floats
 from cavsumo.model.scenario import Simulation
 from cavsumo.model.scene import Scene
@@ -30,6 +31,7 @@ from cavsumo.model.seeds import starts_generator
 from cavsumo.model.sensors import Senses
 from cavsumo.model.snapshot import BodyState, Snapshot
 from cavsumo.simulation.ego_progress import EgoProgress, ego_progress
+from cavsumo.simulation.placing import Placed, placed
 from cavsumo.simulation.rewards import Feedback, RewardMonitor
 from cavsumo.simulation.setup import Setup
 
@@ -46,7 +48,9 @@ class Episode:
     """What happened, while and after it happens.
 
     Frames and actions only where they are kept; ``drives``: whether the ego steers itself;
-    ``forecast``: what the testers said of it beforehand.
+    ``forecast``: what the testers said of it beforehand; ``starts``: where they started, and
+    ``waited``: where they were while the ego entered; ``departures``: of the background, None
+    where they were not recorded or do not tell all of it.
     """
 
     judgement: Judgement
@@ -70,6 +74,9 @@ class Episode:
     emergency_stops: int = 0
     frames: list[Snapshot] = field(default_factory=list)
     actions: list[Joint] = field(default_factory=list)
+    starts: tuple[Start, ...] = ()
+    waited: tuple[Start, ...] = ()
+    departures: Demand | None = None
     drives: bool = False
     forecast: Forecast | None = None
 
@@ -88,6 +95,7 @@ class EpisodeLoop:
         record: keep every snapshot, and show everybody in it.
         keep: keep every snapshot as it is, and what the agents chose, to play it again.
         simulation: whose it is played in (``World.reset``).
+        demand: departures of the background that were recorded, in place of the scenario's demand.
 
     Attributes:
         scene: what does not change during the episode.
@@ -105,12 +113,14 @@ class EpisodeLoop:
         record: bool = False,
         keep: bool = False,
         simulation: Simulation = "own",
+        demand: Demand | None = None,
     ) -> None:
         self._setup, self._agents, self._record = setup, agents, record or keep
-        self.scene, self.snapshot, self._senses = _reset(setup, agents, seed, record, simulation)
+        self.scene, self._senses, begun = _reset(setup, agents, seed, record, simulation, demand)
+        self.snapshot = begun.snapshot
         self._show(self.snapshot)
         self._rewards = RewardMonitor(self.scene, setup.teams)
-        self._episode = Episode(Judgement(""))
+        self._episode = Episode(Judgement(""), starts=begun.starts, waited=begun.waited)
         self._episode.forecast = _foretold(agents, self.agent_views)
         self._validity = ValidityMonitor(self.scene)
         self._history: list[Snapshot] = []  # what blame and progress are found from
@@ -232,26 +242,33 @@ def play(
 
 
 def _reset(
-    setup: Setup, agents: Sequence[Agent], seed: int, record: bool, simulation: Simulation
-) -> tuple[Scene, Snapshot, Senses | None]:
-    """Draw the starts and begin an episode; one generator for each who draws."""
+    setup: Setup,
+    agents: Sequence[Agent],
+    seed: int,
+    record: bool,
+    simulation: Simulation,
+    demand: Demand | None,
+) -> tuple[Scene, Senses | None, Placed]:
+    """Place the testers and begin an episode; one generator for each who draws."""
     streams = np.random.SeedSequence(seed)
     _, electing, *rest = map(np.random.default_rng, streams.spawn(2 + len(agents)))
     scenario = setup.scenario
     placing = starts_generator(seed if scenario.starts_seed is None else scenario.starts_seed)
-    kinds = [body.kind for body in setup.bodies]
-    ego = setup.world.ego_body
-    starts = setup.site.draw(kinds, ego.kind, scenario.start_speed, placing)
     watching: list[Ego | Agent | Assertion] = [setup.ego, *agents, *setup.assertions]
     # Vehicles keep their distance to whoever is ahead of them, so they see everybody.
-    driving = any(start.approach for start in starts)
-    everything = record or driving or bool(scenario.ego_sensor or scenario.tester_sensor)
+    sensors = bool(scenario.ego_sensor or scenario.tester_sensor)
+    everything = record or bool(setup.site.approaches) or sensors
     everything = everything or any(who.sees_background for who in watching)
-    snapshot = setup.world.reset(
-        seed, _states(setup, starts), starts, everything=everything, simulation=simulation
-    )
-    starts, snapshot = _cleared(setup, starts, snapshot, placing)
-    scene = setup.site.scene(setup.world.dt, ego, setup.bodies, starts, seed)
+
+    def reset(states: Sequence[BodyState], starts: Sequence[Start]) -> Snapshot:
+        shown = {"everything": everything, "note": record}
+        return setup.world.reset(
+            seed, states, starts, simulation=simulation, demand=demand, **shown
+        )
+
+    begun = placed(setup, agents, placing, reset)
+    ego = setup.world.ego_body
+    scene = setup.site.scene(setup.world.dt, ego, setup.bodies, begun.starts, seed)
     scene = dataclasses.replace(scene, horizon=scenario.end)
     senses = _senses(setup, scene, streams)
     for agent, team, rng in zip(agents, setup.teams, rest, strict=True):
@@ -260,23 +277,7 @@ def _reset(
     setup.ego.reset(scene)
     for assertion in setup.assertions:
         assertion.reset(scene)
-    return scene, snapshot, senses
-
-
-def _cleared(
-    setup: Setup, starts: tuple[Start, ...], snapshot: Snapshot, rng: np.random.Generator
-) -> tuple[tuple[Start, ...], Snapshot]:
-    """Starts and first snapshot without testers on foot where others are as the ego enters.
-
-    Traffic is there before the testers are drawn, and where it stands depends on the episode.
-    """
-    kinds = [body.kind for body in setup.bodies]
-    near = [snapshot.ego.box, *(other.box for other in snapshot.background)]
-    if not setup.site.blocked(kinds, starts, near):
-        return starts, snapshot
-    taken = [snapshot.ego.box, *(BodyState(*raw).box for raw in setup.world.everybody())]
-    starts = setup.site.cleared(kinds, starts, taken, rng)
-    return starts, setup.world.shift(tuple(_states(setup, starts)))
+    return scene, senses, begun
 
 
 def _foretold(agents: Sequence[Agent], views: Sequence[Snapshot]) -> Forecast | None:
@@ -295,22 +296,6 @@ def _senses(setup: Setup, scene: Scene, streams: np.random.SeedSequence) -> Sens
         return None
     seeds = streams.spawn(1 + len(setup.teams))
     return Senses(scene, ego, testers, setup.teams, seeds)
-
-
-def _states(setup: Setup, starts: Sequence[Start]) -> list[BodyState]:
-    """The testers' first states."""
-
-    wanted = setup.scenario.start_speed
-
-    def speed(kind: Kind, start: Start) -> float:
-        if start.v is not None:
-            return start.v
-        return kind.v_max if wanted is None else min(kind.v_max, wanted)
-
-    return [
-        BodyState(body, start.x, start.y, speed(body.kind, start), start.o)
-        for body, start in zip(setup.bodies, starts, strict=True)
-    ]
 
 
 def _moved(
@@ -396,5 +381,6 @@ def _finished(
     world = setup.world
     episode.sumo_collisions = frozenset(world.collisions)
     episode.teleports, episode.emergency_stops = world.teleports, world.emergency_stops
+    episode.departures = world.departures
     assert math.isfinite(episode.reward)
     return episode

@@ -23,6 +23,7 @@ from cavsumo.egos.base import Acceleration, Command, Drive, Ego
 from cavsumo.errors import NoSuchAction, SimulationError, SimulationTaken
 from cavsumo.model.bodies import PEDESTRIAN, Body
 from cavsumo.model.carriageway import Start
+from cavsumo.model.departures import Demand
 from cavsumo.model.geometry import Box, gap
 from cavsumo.model.kinematics import steering_for_turn, step_floats, wrap
 from cavsumo.model.scenario import Scenario, Simulation
@@ -30,6 +31,7 @@ from cavsumo.model.snapshot import BodyState, RawState, Snapshot
 from cavsumo.network.site import Site
 from cavsumo.sumo.background import Background, Roaming, roaming
 from cavsumo.sumo.connection import Simulations
+from cavsumo.sumo.demand import DepartureNotes
 from cavsumo.sumo.poses import from_sumo, front
 
 EGO = "ego"
@@ -95,6 +97,8 @@ class World:
         *,
         everything: bool = True,
         simulation: Simulation = "own",
+        demand: Demand | None = None,
+        note: bool = False,
     ) -> Snapshot:
         """Begin an episode and wait until the ego is on the road; the testers stand where given.
 
@@ -103,6 +107,9 @@ class World:
                 starts one that serves several episodes, of which the later ones say "same".
             everything: show the whole background in every snapshot; else only those who may touch
                 the ego or a tester, which is all that contacts need.
+            demand: departures that were noted in another episode, in place of the scenario's own
+                demand; only in an own simulation.
+            note: note who departs (``departures``).
 
         Raises SimulationError with SUMO's own words when it refuses, or when the ego finds no
         room to enter.
@@ -114,11 +121,14 @@ class World:
         self._step, self._steering = 0, 0.0
         self._commanded = False
         self._vehicles: tuple[str, ...] = ()
+        self._departures: DepartureNotes | None = None
         if simulation == "same":
             self._check_own()
         _PLAYING[0] = self._mark
         with self._listening():
-            self.simulations.begin(seed, simulation)
+            self.simulations.begin(seed, simulation, demand)
+            if note:
+                self._departures = self._notes(demand, states)
             self._insert(states, starts)
             ego = self._enter(states)
             self._make_room(states, starts)
@@ -150,7 +160,7 @@ class World:
         try:
             self._place(states)
             self._command_ego(command)
-            self.simulations.advance()
+            self._advance()
             self._collect_events()
             ego = self._read_ego() if self._driven is None else self._driven
         except (libsumo.TraCIException, libsumo.FatalTraCIError) as error:
@@ -216,7 +226,7 @@ class World:
     def _enter(self, states: Sequence[BodyState]) -> BodyState:
         """Step until the ego has entered; the testers wait meanwhile."""
         for waited in range(max(2, round(ENTRY_S / self.dt))):
-            self.simulations.advance()
+            self._advance()
             ego = self._read_ego()
             if ego is not None:
                 if waited * self.dt > PROMPT_S:
@@ -289,6 +299,25 @@ class World:
             self._place([self._driven])
 
     # What SUMO says
+
+    def _notes(self, demand: Demand | None, states: Sequence[BodyState]) -> DepartureNotes | None:
+        """Where to note who departs; None when departures do not tell all of the demand."""
+        types = self.simulations.types_told if demand is None else demand.types
+        mine = frozenset((EGO, *(state.id for state in states)))
+        return None if types is None else DepartureNotes(types, mine)
+
+    @property
+    def departures(self) -> Demand | None:
+        """Who departed so far in this episode; None if not noted, or if that would not tell all."""
+        return None if self._departures is None else self._departures.demand()
+
+    def _advance(self) -> None:
+        """One timestep of SUMO; those who depart in it are noted."""
+        notes = self._departures
+        now = libsumo.simulation.getTime() if notes is not None else 0.0
+        self.simulations.advance()
+        if notes is not None:
+            notes.add(libsumo, now)
 
     def _read_ego(self) -> BodyState | None:
         """The ego as SUMO moves it; None before it entered and after it left."""

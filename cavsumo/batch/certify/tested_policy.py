@@ -13,14 +13,15 @@ from pathlib import Path
 from typing import Any
 
 from cavsumo.agents import AGENTS
-from cavsumo.agents.casting import params_of, resolve_cast, teams, tester_bodies
+from cavsumo.agents.casting import params_of, resolve_cast, teams
 from cavsumo.agents.policy import policy_file
-from cavsumo.agents.recorded import action_between
 from cavsumo.batch.jobs import Memory
+from cavsumo.batch.playback import recording_of
 from cavsumo.batch.preflight import recorded_settings
 from cavsumo.batch.replay import Record, known, prepared_again, replayed
 from cavsumo.batch.worker import Worker
 from cavsumo.errors import InputError, ResultsError, UnknownName
+from cavsumo.model.carriageway import StartRecord
 from cavsumo.model.labels import cast_of
 from cavsumo.model.scenario import BatchPlan, Params
 from cavsumo.results.provenance import EXTENT
@@ -44,6 +45,8 @@ class Subject:
         known: what it knows at the beginning of every episode, by label.
         starts_seed: the seed of the episode whose starts it keeps; None to draw them anew.
         starts: those starts, x, y and o of each tester's body, where they were recorded.
+        told: the starts that the agent knows and that are not drawn; empty for none.
+        approaches: the types of approach among which theirs were numbered.
     """
 
     words: str
@@ -52,6 +55,8 @@ class Subject:
     known: Mapping[str, Memory] = field(default_factory=dict)
     starts_seed: int | None = None
     starts: Sequence[tuple[float, float, float]] | None = None
+    told: Sequence[StartRecord] = ()
+    approaches: Sequence[str] = ()
 
 
 def of_run(record: Record, params: Params, *, kept: bool, open_loop: bool) -> Subject:
@@ -66,15 +71,18 @@ def of_run(record: Record, params: Params, *, kept: bool, open_loop: bool) -> Su
     if label not in plan.cast:
         raise ResultsError(f"run {record.run} of {record.file}: no agent {label!r} in its manifest")
     words = f"run {record.run} of {record.file} ({label})"
-    own = (starts_seed(record), _starts(record)) if kept else (None, None)
+    own: dict[str, Any] = {}
+    if kept:
+        own = {"starts_seed": starts_seed(record), "starts": _starts(record)}
     if open_loop:
         if params:
             raise InputError("--open-loop: the recorded actions have no parameters")
-        again = f"run{record.run}"
-        memory = {again: actions_of(_trace(record), plan)}
-        return Subject(f"{words}, open loop", f"{again}=recorded", {}, memory, *own)
+        again, played = f"run{record.run}", recording_of(record, _trace(record))
+        memory = {again: played.memories(teams(plan.scenario))}
+        own |= {"told": played.starts, "approaches": played.approaches}
+        return Subject(f"{words}, open loop", f"{again}=recorded", {}, memory, **own)
     memory = {label: found} if (found := _known_before(record)) is not None else {}
-    return Subject(words, _word(plan, label), params_of(plan, label) | params, memory, *own)
+    return Subject(words, _word(plan, label), params_of(plan, label) | params, memory, **own)
 
 
 def of_policy(
@@ -115,6 +123,8 @@ def settings_of(
     }
     if subject.starts_seed is not None:
         settings["starts_seed"] = subject.starts_seed
+    if subject.approaches:
+        settings["approaches"] = list(subject.approaches)
     if settings.get("traffic") is not None:
         settings.setdefault("traffic_seed", manifest["plan"]["seed"])
     return settings
@@ -162,24 +172,3 @@ def _trace(record: Record) -> Trace:
     if again.trace is None:
         raise InputError(f"--open-loop: run {record.run} ended in an error: it has no actions")
     return again.trace
-
-
-def actions_of(trace: Trace, plan: BatchPlan) -> Memory:
-    """What each agent of an episode did: for each timestep throttle and steering of its bodies."""
-    scenario, bodies = plan.scenario, tester_bodies(plan.scenario)
-
-    def joints(team: Sequence[int]) -> list[list[tuple[float, float]]]:
-        return [
-            [
-                action_between(
-                    bodies[i].kind,
-                    before["testers"][bodies[i].id],
-                    after["testers"][bodies[i].id],
-                    scenario.step_length,
-                )
-                for i in team
-            ]
-            for before, after in zip(trace.frames, trace.frames[1:], strict=False)
-        ]
-
-    return tuple(joints(team) for team in teams(scenario))

@@ -39,6 +39,7 @@ from cavsumo.model.labels import cast_of, labelled
 from cavsumo.model.scenario import BatchPlan, Params
 from cavsumo.model.seeds import starts_generator
 from cavsumo.model.study import Part, product
+from cavsumo.network.recorded_starts import recorded_start
 
 FORMAT = 1  # of the JSON; raised when a key changes its meaning or goes
 WIDTH = 120
@@ -146,7 +147,10 @@ def _check_batches(
     for batch in batches:
         if batch.output.resolve() in read:
             raise InputError(f"output {str(batch.output)!r}: is one of the results")
-    if record is None or subject.starts_seed is None:
+    for batch in batches if subject.told else ():
+        for start in subject.told:
+            recorded_start(batch.prepared.site, start)
+    if record is None or subject.starts_seed is None or subject.told:
         return
     seed, ours = subject.starts_seed, subject.starts
     if ours is None:

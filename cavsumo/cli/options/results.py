@@ -31,6 +31,12 @@ def add_replay(commands: Any) -> None:
         help="show what was recorded, without running it again: with other versions, say",
     )
     add(
+        "--playback",
+        action="store_true",
+        help="play its recorded actions and traffic back instead of asking its agent: from its "
+        "trace and the network, without routes",
+    )
+    add(
         "--trust",
         action="store_true",
         help="play it even if its ego or an assertion, named in the file, is a command to run, a "
