@@ -1,4 +1,4 @@
-"""Things of the user's, named ``module:attribute``: importing them, and the files they stand in."""
+"""Plugins of the user, named ``module:attribute``: importing them, and finding their files."""
 
 from __future__ import annotations
 
