@@ -1,4 +1,4 @@
-"""Again what was done before: actions that were chosen beforehand, whatever happens now."""
+"""Recorded actions, repeated independently of the present state."""
 
 from __future__ import annotations
 
@@ -19,9 +19,9 @@ Joint = Sequence[tuple[float, float]]  # throttle and steering of each owned bod
 
 @AGENTS.register("recorded")
 class RecordedAgent(Agent):
-    """Repeats the actions that it is told (``certify --open-loop``), then does nothing.
+    """Repeats given actions (``certify --open-loop``), then does nothing.
 
-    It is told them as what it remembers: for each timestep the actions of its bodies.
+    They are given as its knowledge: for each timestep the actions of its bodies.
     """
 
     sees_background = False
@@ -48,8 +48,8 @@ def action_between(
 ) -> tuple[float, float]:
     """Throttle and steering that lead a body from one state (x, y, v, o) to the next (eqs 20-22).
 
-    A speed at its limit comes from the effector at its limit, so that it is met exactly; where a
-    turn is lost in rounding there is none.
+    A speed at its limit comes from the effector at its limit, so that it is reproduced exactly; a
+    turn below the rounding error is none.
     """
     _, _, v, o = before
     _, _, v_next, o_next = after

@@ -1,9 +1,9 @@
-"""What the ego must not do: the protocol (``base``), the registry, one file an assertion.
+"""Assertions about the ego: the protocol (``base``), the registry, one file per assertion.
 
-Also what an episode is judged by besides: contacts, validity of the testers, blame, naturalness,
-criticality, ``metrics`` (functions of numbers), ``formulas`` (temporal logic).
-Importing this package registers the assertions that come with cavsumo. Nothing here moves a body.
-To add one: a file here, its name in the import below.
+Also the other evaluations of an episode: contacts, validity of the testers, blame, naturalness,
+criticality, ``metrics`` (functions of numbers), ``formulas`` (temporal logic). Importing this
+package registers the assertions that come with cavsumo. No file here moves a body. To add one: a
+file here, its name in the import below.
 """
 
 from cavsumo.assertions import (  # noqa: F401  (imported to be registered)

@@ -18,7 +18,7 @@ from cavsumo.sumo.world import World
 
 @dataclass(frozen=True)
 class Setup:
-    """All that episodes of one scenario share.
+    """The objects that episodes of one scenario share.
 
     Attributes:
         world, site, ego, assertions: as built from the scenario.
@@ -27,8 +27,8 @@ class Setup:
         horizon: length of an episode [s].
         start_speed: of the testers [m/s]; None for their maximum.
         starts_seed: of the episode whose starts all episodes have; None for their own.
-        ego_sensor, tester_sensor: what the ego and the agents see the others through; None for
-            full observability.
+        ego_sensor, tester_sensor: sensors of the ego and of the agents; None for full
+            observability.
     """
 
     world: World
@@ -45,7 +45,7 @@ class Setup:
 
     @property
     def mission(self) -> Mission:
-        """What the ego may know beforehand."""
+        """The data that the ego has before its first episode."""
         site, route = self.site, self.site.route
         return Mission(site.net, route.edges, route.path, site.lights, self.world.dt, self.horizon)
 

@@ -1,6 +1,6 @@
-"""SUMO's simulation: one for each episode, or one that serves several, begun again and again.
+"""SUMO's simulation: one for each episode, or one for several episodes.
 
-Speaks to SUMO through the functions it is given, so that ``world`` stays the one boundary.
+It calls SUMO through given functions, so that ``world`` stays the one boundary.
 """
 
 from __future__ import annotations
@@ -22,14 +22,14 @@ class Simulations:
 
     Args:
         sumo: SUMO's functions.
-        folder: where files for SUMO may be written.
+        folder: the folder for files that SUMO reads.
     """
 
     def __init__(self, sumo: Any, scenario: Scenario, site: Site, ego: Ego, folder: Path) -> None:
         self._sumo, self._scenario, self._site = sumo, scenario, site
         self._types = folder / "types.add.xml"
         self._types.write_text(type_file(scenario, ego), encoding="utf-8")
-        self._kept = folder / "kept.add.xml"  # what stays of the demand when we send it ourselves
+        self._kept = folder / "kept.add.xml"  # the demand without departures
         self._net, self._routes = scenario.net_file, scenario.routes_file
         if site.demand is not None:
             self._routes = folder / "traffic.rou.xml"
@@ -38,7 +38,7 @@ class Simulations:
         self._departures: Departures | None = None
 
     def begin(self, seed: int, simulation: Simulation) -> None:
-        """Start SUMO, or put it back to how it was when it started (``World.reset``)."""
+        """Start SUMO, or restore its initial state (``World.reset``)."""
         if simulation == "same" and self._departures is not None:
             cleared(self._sumo)
             self._lights.restore()
@@ -62,7 +62,7 @@ class Simulations:
         self._sumo.simulationStep()
 
     def set_light(self) -> None:
-        """Have the first traffic light on the ego's route show what was asked for."""
+        """Set the first traffic light on the ego's route to its required phase."""
         start, lights = self._site.light, self._sumo.trafficlight
         if start is None:
             return
@@ -76,7 +76,7 @@ class Simulations:
         lights.setPhaseDuration(start.light, start.left)
 
     def command(self, seed: int, *, shared: bool = False) -> list[str]:
-        """The command line of SUMO; of the demand only its types when it is sent by us."""
+        """The command line of SUMO, with only the types of the demand if cavsumo sends it."""
         scenario = self._scenario
         more = [*scenario.additional, self._types]
         if shared and self._kept.exists():
