@@ -1,7 +1,7 @@
 """cavsumo: generates tests for autonomous vehicles in SUMO.
 
 The rooms, in the order in which they may use each other, are listed in ``docs/architecture.md``.
-Nothing of them is imported here, so that ``import cavsumo`` costs nothing.
+No room is imported here, so that ``import cavsumo`` is quick.
 """
 
 import sys
@@ -12,7 +12,7 @@ from types import ModuleType
 
 __version__ = "0.1.0"
 
-# Modules that version 0.1 had at the root and that users import, by where they stand now.
+# Modules that version 0.1 had at the root and that users import, by their present names.
 _MOVED = {
     "bodies": "model.bodies",
     "checks": "model.checks",
@@ -52,7 +52,7 @@ class _MovedModules(MetaPathFinder, Loader):
         return module
 
     def exec_module(self, module: ModuleType) -> None:
-        """Nothing is left to load; the module keeps the spec of its new name."""
+        """The module is already loaded; it keeps the spec of its new name."""
         module.__spec__ = module.__spec__ and module.__spec__.loader_state
 
 

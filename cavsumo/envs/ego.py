@@ -14,7 +14,7 @@ from cavsumo.envs.spaces import normalised, observation_space
 
 
 class EgoEnv(OneLearner):
-    """The learner drives the ego along its route and should cope with the tests it meets.
+    """The learner drives the ego along its route and should pass the tests it meets.
 
     Observation, action, reward and info are described in docs/environments.md. The other keywords
     are the settings of a scenario file.
@@ -24,7 +24,7 @@ class EgoEnv(OneLearner):
         control: "acceleration" (SUMO keeps the ego on its route) or "drive" (throttle and
             steering, by the kinematics).
         max_speed: the ego drives no faster [m/s].
-        depart_speed: its first speed [m/s]; None for as fast as SUMO finds safe.
+        depart_speed: its first speed [m/s]; None for the largest that SUMO considers safe.
         config, hold, process, render_mode: as for ``TesterEnv``.
 
     Raises InputError when a setting is wrong.

@@ -1,4 +1,4 @@
-"""Episodes of one scenario played step by step, some roles moved from outside.
+"""Episodes of one scenario played step by step, with some roles controlled by the caller.
 
 This is the part of an environment that has SUMO; it may live in another process (``elsewhere``).
 """
@@ -29,7 +29,7 @@ EGO = "ego"
 
 
 class Seen(NamedTuple):
-    """What those who move something get back.
+    """The result of a step for the roles that the caller controls.
 
     Attributes:
         observations, rewards: by role: "ego", and the names of the teams (``team_name``).
@@ -46,7 +46,7 @@ class Seen(NamedTuple):
 
 
 def team_name(bodies: Sequence[Body], team: Sequence[int]) -> str:
-    """What a team is called: as its body, or as its first and last."""
+    """The name of a team: that of its body, or those of its first and last."""
     first, last = bodies[team[0]].id, bodies[team[-1]].id
     return first if first == last else f"{first}-{last.removeprefix('tester')}"
 
@@ -89,7 +89,7 @@ class Episodes:
         rewards = dict.fromkeys(self._names, 0.0)
         ended = self._ended()
         for _ in range(self._roles.hold):
-            if any(ended):  # it was decided before anybody moved
+            if any(ended):  # it was decided before the first action
                 break
             self._advance(loop, rewards)
             ended = self._ended()
@@ -100,11 +100,11 @@ class Episodes:
         return Seen(self._observations(), rewards, *ended, info)
 
     def snapshot(self) -> Snapshot:
-        """What there is to be seen now."""
+        """The snapshot of the present state."""
         return self._watch.loop.snapshot
 
     def close(self) -> None:
-        """End SUMO and whatever the ego started."""
+        """End SUMO and the ego's processes and connections."""
         self._loop = None
         if self._setup is not None:
             self._end()
@@ -138,7 +138,7 @@ class Episodes:
             self._puppet_ego.told = actions[EGO]
 
     def _advance(self, loop: EpisodeLoop, rewards: dict[str, float]) -> None:
-        """One timestep, and what everybody earned in it."""
+        """One timestep, and the rewards of all roles in it."""
         assert self._setup is not None
         before = loop.snapshot
         try:
@@ -171,7 +171,7 @@ class Episodes:
         return decided, not decided
 
     def _observations(self) -> dict[str, Vector]:
-        """What each role is shown now."""
+        """The observation of each role."""
         loop = self._watch.loop
         views = loop.agent_views if self._observers else ()
         seen = {

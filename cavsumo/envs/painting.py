@@ -1,4 +1,4 @@
-"""A snapshot as a picture from above, with Pillow: roads, the ego's path and zones, everybody.
+"""A snapshot as a picture from above, with Pillow: roads, the ego's path and zones, all bodies.
 
 The picture follows the ego. It is drawn twice as large and then reduced, for smooth edges.
 """
@@ -31,7 +31,7 @@ SCALE = 11.0  # px/m
 FINER = 2  # drawn so many times larger
 AHEAD_M = 16.0  # the middle of the picture is so far ahead of the ego
 DASH_M = 2.0  # of the ego's path
-HEAD_M = 0.3  # radius of who walks, seen from above
+HEAD_M = 0.3  # radius of a pedestrian, seen from above
 
 GROUND, ROAD, PAVEMENT, MARKING = "#e9ece2", "#8b9096", "#d3ccbb", "#f4f4f0"
 CROSSING, AXIS = "#b9bcbd", "#9a9fa4"
@@ -149,7 +149,7 @@ class _Canvas:
         self._pen.line(self._pixels(points), fill=colour, width=max(1, round(width * self._scale)))
 
     def tint(self, points: Points, colour: tuple[int, int, int, int]) -> None:
-        """Fill one polygon with a colour that lets what is below through."""
+        """Fill one polygon with a transparent colour."""
         if len(points) > 2:
             self._pen.polygon(self._pixels(points), fill=colour)
 
@@ -185,7 +185,7 @@ def _middle(ego: BodyState) -> tuple[float, float]:
 
 
 def _draw(canvas: _Canvas, state: BodyState, colour: str) -> None:
-    """A body's box, for vehicles with a windscreen; who walks has a nose."""
+    """Draw a body: a box, with a windscreen for vehicles, a circle with a nose for pedestrians."""
     canvas.body(corners(state.box), colour)
     kind, ahead = state.body.kind, (math.cos(state.o), math.sin(state.o))
     if kind.name in WALKING:

@@ -22,7 +22,7 @@ View = tuple[float, float, float, float]  # west, south, east, north [m]
 
 
 class Outlines(NamedTuple):
-    """What is drawn of a network, by what it is, in the order of drawing.
+    """The outlines of a network by kind, in the order of drawing.
 
     Attributes:
         areas, lines: their points [m]; those of an area go round it.
@@ -33,7 +33,7 @@ class Outlines(NamedTuple):
 
 
 def scenery(network: Network, site: Site, view: View) -> dict[str, Any]:
-    """What is drawn of a network within a view, packed."""
+    """The outlines of a network within a view, packed."""
     ground = outlines(network, site, view)
     return {
         "areas": {name: shapes(found) for name, found in ground.areas.items()},
@@ -44,7 +44,7 @@ def scenery(network: Network, site: Site, view: View) -> dict[str, Any]:
 
 
 def outlines(network: Network, site: Site, view: View) -> Outlines:
-    """What is drawn of a network within a view."""
+    """The outlines of a network within a view."""
     lanes = surfaces.lanes_by_kind(network)
     borders, stripes = _crossings(network)
     lines = list(surfaces.markings(network))
@@ -101,7 +101,7 @@ def _lines(found: Iterable[shapely.Geometry], view: View) -> list[list[Any]]:
 
 
 def _parts(found: Iterable[shapely.Geometry], view: View, sort: str) -> list[Any]:
-    """What is in view of shapes, part by part; what shapely cannot cut is left whole."""
+    """The parts of shapes in view; shapes that shapely cannot cut are left whole."""
     kept = []
     for shape in found:
         simple = shape.simplify(ALIKE_M)
