@@ -41,15 +41,20 @@ class Agent:
             from its bodies. Set it to False if not: when no agent, ego and assertion of an episode
             does, bodies far from the ego and the testers are left out of the snapshots.
         drives: whether its bodies may be vehicles. Set it to False if it can only walk.
+        learns: whether episodes change its knowledge: then they are played in sequence.
+        promise: the class of egos for which its forecasts hold; empty for none.
+        manoeuvre: the one manoeuvre of its vehicles (``manoeuvres.MANOEUVRES``), which start where
+            it is possible; "auto" for the manoeuvre that is possible at their start.
         FILES: its parameters that name files; their checksums are noted with the results.
     """
 
     PARAMETERS: ClassVar[Mapping[str, str]] = {}
     FILES: ClassVar[tuple[str, ...]] = ()
-    learns: bool = False  # whether episodes change its knowledge: then they are played in sequence
+    learns: bool = False
     sees_background: bool = True
     drives: bool = True
-    promise: str = ""  # the class of egos for which its forecasts hold; empty for none
+    promise: str = ""
+    manoeuvre: str = "auto"
 
     scene: Scene
     owned: tuple[int, ...]

@@ -8,7 +8,6 @@ from concurrent.futures import Executor
 from pathlib import Path
 from typing import Any
 
-from cavsumo.agents.casting import make_agents
 from cavsumo.batch.batch_run import BatchRun
 from cavsumo.batch.executors import Means, opened
 from cavsumo.batch.interrupts import Interrupts
@@ -94,7 +93,7 @@ def _play(
         sequential=looks_at_rows(prepared.plan),
         shared=prepared.plan.reset == "shared",
         cut_short=batch_run.cut_short or batch_run.status == "interrupted",
-        promises={n: make_agents(prepared.plan, n)[0].promise for n in prepared.plan.cast},
+        promises={member.label: member.promise for member in prepared.cast},
     )
 
 
