@@ -2,5 +2,5 @@
 
 Also the tools of all other rooms: seeds, checks of numbers, registries, plugins of the user.
 No file here reads a network, decides an action or imports SUMO.
-To add a setting of a scenario: a field in ``scenario``. To add a kind of body: ``bodies``.
+To add a setting: a field in ``scenario/record`` or ``plan``. To add a kind of body: ``bodies``.
 """

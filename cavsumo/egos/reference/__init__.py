@@ -1,15 +1,18 @@
 """Reference drivers, by which violations are judged avoidable or not: one file per driver, without
 SUMO.
 
-Importing this package registers the drivers that come with cavsumo. To add one: a file here, its
-name in the import below.
+To add one: a file here, its name in ``names``; it is imported when one is built.
 """
 
-from cavsumo.egos.reference import (  # noqa: F401  (imported to be registered)
-    human,
-    ideal,
-    rss,
-)
-from cavsumo.egos.reference.base import REFERENCES, Reference
+from typing import TYPE_CHECKING
+
+from cavsumo.model.lazily import lazily
+
+if TYPE_CHECKING:
+    from cavsumo.egos.reference.base import REFERENCES, Reference
 
 __all__ = ["REFERENCES", "Reference"]
+
+__getattr__ = lazily(
+    __name__, dict.fromkeys(("REFERENCES", "Reference"), "cavsumo.egos.reference.base")
+)
