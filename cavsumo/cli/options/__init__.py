@@ -11,7 +11,8 @@ from collections.abc import Callable, Iterator
 from importlib import import_module
 from typing import Any
 
-FIRST = ("run", "results", "certify", "check_ego", "networks")  # files whose commands lead the help; then by name
+# Files whose commands lead the help; the others follow by name.
+FIRST = ("run", "results", "certify", "check_ego", "networks")
 
 
 def adders() -> Iterator[Callable[[Any], None]]:
