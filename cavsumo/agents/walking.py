@@ -180,7 +180,7 @@ class ApproachKerb:
         left = self.stop - self.way.progress(state.x, state.y)
         if left < THERE_M:
             return walk(state, state.o, 0.0, self.dt)  # or it would creep on for ever
-        # This timestep's way is walked at the old speed, whatever the throttle does.
+        # This timestep's way is walked at the old speed, for any throttle.
         allowed = stopping_speed(kind, left - state.v * self.dt, self.dt)
         if self.turning:
             return walk(state, self.way.heading, allowed, self.dt)

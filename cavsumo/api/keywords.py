@@ -10,7 +10,7 @@ from cavsumo.errors import InputError
 from cavsumo.model.objects import SentObject, sent
 from cavsumo.model.scenario import Scenario
 
-LISTS = ("agents", "assertions", "approaches", "additional")  # one word will do for a list of it
+LISTS = ("agents", "assertions", "approaches", "additional")  # or one word
 
 
 def settings_of(net: Any, keywords: Mapping[str, Any]) -> tuple[dict[str, Any], list[SentObject]]:

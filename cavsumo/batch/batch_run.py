@@ -1,4 +1,4 @@
-"""A batch being played into its results file: from the start, from where it stopped, or again."""
+"""Playing a batch into its results file: from the start, continued, or errors again."""
 
 from __future__ import annotations
 
@@ -27,16 +27,16 @@ LOOK_AHEAD = 4  # episodes under way or waiting for their turn, for each that is
 
 @dataclass
 class BatchRun:
-    """A batch under way; call ``begin`` or ``resume``, then what is to be done, then ``end``.
+    """A running batch; call ``begin`` or ``resume``, then ``play`` or ``retry``, then ``end``.
 
     Attributes:
-        prepared, recorder: what is played, and who writes it.
-        executor, jobs: who plays it, and how many episodes at a time.
-        stopped: says whether somebody asked to stop.
+        prepared, recorder: the batch, and the writer of its results.
+        executor, jobs: the executor, and the number of episodes at a time.
+        stopped: returns whether the user asked to stop.
         quiet: no progress.
-        tally: what was found, earlier sessions included.
-        status: how the batch stands: finished, stopped (by a rule), interrupted or broken.
-        cut_short: whether somebody stopped it before all errors were played again.
+        tally: the counts, earlier sessions included.
+        status: finished, stopped (by a rule), interrupted or broken.
+        cut_short: whether the user stopped it before all errors were played again.
     """
 
     prepared: PreparedBatch
@@ -59,7 +59,7 @@ class BatchRun:
         self.recorder.begin(manifest, overwrite=overwrite)
 
     def resume(self, manifest: Mapping[str, Any]) -> None:
-        """Take up the rows that are there."""
+        """Take up the recorded rows."""
         self._todo = self.prepared.plan.todo()
         self._lessons = Lessons(self.prepared, manifest)
         for row in self.recorder.resume(manifest, self._todo):
@@ -70,7 +70,7 @@ class BatchRun:
         self.status = recorded if recorded in COMPLETE else "interrupted"
 
     def play(self) -> None:
-        """Play what is left, until the end or a reason to stop."""
+        """Play the remaining episodes, until the end or a reason to stop."""
         self.status = "broken"
         rule = stopping_rule(self.prepared.plan)
         reason = rule(self.tally)
@@ -90,9 +90,10 @@ class BatchRun:
         self.recorder.manifest["stopped_by"] = reason
 
     def retry(self) -> None:
-        """Play the episodes again that could not be played.
+        """Play the episodes again that ended in errors.
 
-        An agent that learns missed a lesson then: it starts anew, and its later rows change too.
+        A learning agent did not learn from such an episode: it starts anew, and its later rows
+        change.
         """
         todo, pupils = _to_retry(self.recorder.csv_file, self.prepared.plan, self._lessons.names)
         known = self._lessons.known()
@@ -120,7 +121,7 @@ class BatchRun:
         self.recorder.finish(self.status, facts | self._lessons.facts())
 
     def _note_outputs(self) -> bool:
-        """Note in the manifest which files the ego has written; whether there are new ones."""
+        """Record the files that the ego has written in the manifest; returns whether any is new."""
         noted = self.recorder.manifest
         before = set(noted.get(OUTPUTS) or ())
         found = before.union(self._watch.outputs())
@@ -131,7 +132,7 @@ class BatchRun:
         return True
 
     def _answers(self, todo: Iterable[int]) -> Iterator[Answer]:
-        """Have episodes played."""
+        """Play episodes by the executor."""
         return run_batch(
             self.prepared,
             self.executor,
@@ -145,7 +146,7 @@ class BatchRun:
 def _to_retry(
     csv_file: Path, plan: BatchPlan, learners: frozenset[str]
 ) -> tuple[list[int], frozenset[str]]:
-    """The episodes to play again, and which learners start anew because they have any.
+    """The episodes to play again, and the learners that start anew because they have any.
 
     Those are all episodes of such a learner, and all that shared a simulation with an error.
     """

@@ -52,7 +52,7 @@ def _joined(words: Sequence[str]) -> list[str]:
 
 
 class _OptionParser(argparse.ArgumentParser):
-    """argparse with our way of saying no: one sentence, exit status 2.
+    """argparse with errors in one sentence and exit status 2.
 
     Attributes:
         fill: adds the options of a command whose options are read from the scenario record, once

@@ -104,7 +104,7 @@ def _refuse_what_is_learned(
     for key in replaced:
         if given.get(key):
             who = "ego is" if key.startswith("ego") else "testers are"
-            raise InputError(f"{roles.named}: {key}: the {who} moved by whoever steps this")
+            raise InputError(f"{roles.named}: {key}: the {who} moved by the caller of step")
         settings.pop(key, None)
 
 

@@ -112,7 +112,7 @@ def has_georeference(network: Network) -> bool:
 
 
 def _neighbours(network: Network) -> dict[str, set[str]]:
-    """The junctions that roads connect with each junction, whatever their direction."""
+    """The junctions that roads connect with each junction, in either direction."""
     found: dict[str, set[str]] = {}
     for edge in network.edges:
         a, b = str(edge.getFromNode().getID()), str(edge.getToNode().getID())

@@ -1,8 +1,8 @@
-"""Traces: what happened in an episode, and all that is needed to play it again elsewhere.
+"""Traces: the record of an episode, with all data for playing it again on another machine.
 
-JSON lines. The first is the head: the row, the plan, what the agents knew before, the checksums of
-the files, the versions, and the boxes of all bodies. Then one frame a timestep. The head holds
-nothing that says how much of a batch was played, so a trace is the same in every shard.
+JSON lines. The first is the head: the row, the plan, the agents' knowledge before, the checksums of
+the files, the versions, and the boxes of all bodies. Then one frame a timestep. The head does not
+depend on how much of a batch was played, so a trace is the same in every shard.
 """
 
 from __future__ import annotations
@@ -47,7 +47,7 @@ class Shape(NamedTuple):
 
 @dataclass(frozen=True)
 class Trace:
-    """An episode as it was recorded.
+    """A recorded episode.
 
     Attributes:
         head: all but the frames, see ``trace_head``.
@@ -59,7 +59,7 @@ class Trace:
 
     @property
     def row(self) -> dict[str, str]:
-        """The row of the episode as text, without what no replay reproduces."""
+        """The row of the episode as text, without the columns that a replay does not reproduce."""
         return dict(self.head["row"])
 
     def shapes(self) -> dict[str, Shape]:
@@ -70,7 +70,7 @@ class Trace:
 
 
 def origin(plan: BatchPlan, site: Site, inputs: Mapping[str, str]) -> dict[str, Any]:
-    """What the episodes of a plan have in common, for the heads of their traces.
+    """The common part of the heads of a plan's traces.
 
     ``inputs``: the checksums of its files.
     """
@@ -89,7 +89,7 @@ def trace_head(
 
     Args:
         origin: see the function of that name.
-        memory: what the agents knew before; left out, and said so, when it is large.
+        memory: the agents' knowledge before; replaced by a note when it is large.
     """
     known = len(json.dumps(memory)) <= MEMORY_MOST
     return {
@@ -103,7 +103,7 @@ def trace_head(
 
 
 def _bodies(snapshots: Iterable[Snapshot]) -> list[dict[str, Any]]:
-    """Everybody in the order of appearance, those with the same box together."""
+    """All bodies in the order of appearance, those with the same box together."""
     met: dict[str, Body] = {}
     for snapshot in snapshots:
         for body in (snapshot.ego.body, *(t.body for t in snapshot.testers)):
@@ -135,7 +135,7 @@ def _pose(state: BodyState) -> list[float]:
 
 
 def states(frame: Mapping[str, Any]) -> Iterator[tuple[str, str, list[float]]]:
-    """Everybody in a frame: part (ego, tester or background), id and [x, y, v, o]."""
+    """All bodies in a frame: part (ego, tester or background), id and [x, y, v, o]."""
     yield "ego", "ego", frame["ego"]
     for part, key in (("tester", "testers"), ("background", "background")):
         for name, state in frame[key].items():
@@ -158,7 +158,7 @@ def read_trace(file: Path) -> Trace:
 
 
 def parsed(text: str) -> Trace:
-    """The trace that a text holds; raises ValueError and the like when it holds none."""
+    """The trace in a text; raises ValueError and the like for invalid text."""
     first, *lines = text.splitlines() or [""]
     found = json.loads(first)
     if not (isinstance(found, dict) and found.get("format") == FORMAT):
@@ -167,9 +167,9 @@ def parsed(text: str) -> Trace:
 
 
 def read_moments(file: Path, times: Sequence[float]) -> list[tuple[float, dict[str, Any]]]:
-    """For each time [s] the nearest frame of a trace, and how far the ego has driven by then [m].
+    """For each time [s] the nearest frame of a trace, and the ego's distance driven by then [m].
 
-    Only those frames are parsed as a whole: traces are long, and a report reads thousands.
+    Only those frames are parsed completely, because traces are long and a report reads thousands.
     """
     try:
         with file.open(encoding="utf-8") as stream:

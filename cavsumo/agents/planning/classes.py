@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 EGO_CLASSES: Mapping[str, str] = {
-    "constant": "keeps its speed, whatever that is",
+    "constant": "keeps its speed",
     "unaware": "keeps its speed until a tester is on the carriageway, then as any",
     "any": "brakes and accelerates as it likes within limits, but never stops",
 }

@@ -4,7 +4,7 @@ Player 2 has one action (or, for a robust plan, may bend the counts within their
 A state is (entry, zeta, v, held, class):
 
 * ``entry``: timesteps until the body enters the strip that the ego sweeps if it walks now. Walking
-  makes it one less, exactly, whatever the body's speed; standing leaves it as it is (braking from
+  reduces it by exactly one, at any speed of the body; standing leaves it as it is (braking from
   full speed it first falls and then grows again by as much). Below 0 it is in the strip.
 * ``zeta = (e - d_b) / s``: the gap e left when the body enters if the ego keeps its speed, less the
   braking zone d_b = v^2 / (2 b), in lengths s of the reaction zone. A fair test has 0 < zeta <= 1.
@@ -141,7 +141,7 @@ def grid_for(counts: Counts, dt: float) -> Grid:
 
 
 class Counted(NamedTuple):
-    """What was counted, as arrays.
+    """The counts as arrays.
 
     Attributes:
         hazard: [aware, age] probability that the ego decides.

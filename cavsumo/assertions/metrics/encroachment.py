@@ -2,9 +2,9 @@
 it.
 
 A body is in that area while its box touches what the other's box sweeps. Tracks are taken for
-piecewise straight: between two moments a box moves straight on, so that of straight motion the
-times are exact, whatever the timestep. Where a box turns, the pieces are so short that its corners
-stay within ``SLACK_M`` of their place.
+piecewise straight: between two moments a box moves straight on, so that the times of straight
+motion are exact for any timestep. Where a box turns, the pieces are so short that its corners stay
+within ``SLACK_M`` of their place.
 
 Two bodies may sweep several common areas, or an endless one if one follows the other. So an area
 consists of consecutive pieces that touch, where the courses cross by at least ``CROSSING_RAD``.

@@ -29,13 +29,13 @@ TRACE = ".jsonl"  # how the name of a trace ends
 
 @dataclass(frozen=True)
 class ReplayOptions:
-    """What a replay is asked for.
+    """Options of the command.
 
     Attributes:
         run: number of the episode in results; None when a trace is given.
-        net, routes: where the network and the routes are, if not where they were.
-        recorded: take the trace as it is and play nothing.
-        trust: play it even if that runs, imports or connects to what only the file names.
+        net, routes: present paths of the network and the routes, if they have changed.
+        recorded: use the recorded trace without playing it.
+        trust: play it even if that uses code or an address that only the file names.
         html, fcd: files to write.
         gui: show it in sumo-gui, with so many milliseconds a timestep.
     """
@@ -52,7 +52,7 @@ class ReplayOptions:
 
     @property
     def shown(self) -> bool:
-        """Whether the trace is of any use."""
+        """Whether the trace is needed."""
         return bool(self.html or self.fcd or self.gui)
 
 
@@ -80,7 +80,7 @@ def replay(file: Path, wanted: ReplayOptions = ReplayOptions()) -> int:
 
 
 def _record(file: Path, wanted: ReplayOptions) -> Record:
-    """The episode that is meant, with its files."""
+    """The chosen episode, with its files."""
     allowed = None if wanted.trust else ()
     if file.suffix == TRACE:
         if wanted.run is not None:
@@ -95,7 +95,7 @@ def _record(file: Path, wanted: ReplayOptions) -> Record:
 
 
 def _recorded_trace(record: Record) -> Trace:
-    """The trace as it was recorded."""
+    """The recorded trace."""
     if record.trace is None:
         raise InputError(f"--recorded: no trace was kept of run {record.run}; it must be played")
     print(f"run {record.run} ({record.row['agent']}): {record.row['outcome']}, as recorded")
@@ -103,7 +103,7 @@ def _recorded_trace(record: Record) -> Trace:
 
 
 def _played(prepared: PreparedBatch, record: Record) -> Trace | None:
-    """The trace of the episode played again, the recorded one; None where an error left none."""
+    """The trace of the episode played again, which equals the recorded one; None after an error."""
     for change in changes(record.origin, manifest(prepared)):
         print(f"cavsumo: {change}", file=sys.stderr)
     with Worker(prepared) as worker:
@@ -117,7 +117,7 @@ def _played(prepared: PreparedBatch, record: Record) -> Trace | None:
 
 
 def _show(site: Site, record: Record, trace: Trace, wanted: ReplayOptions) -> None:
-    """Write and show what was asked for."""
+    """Write and show the requested output."""
     if wanted.fcd is not None:
         write_fcd(trace, wanted.fcd)
     if wanted.html is not None:
