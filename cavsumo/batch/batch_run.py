@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from cavsumo.batch.dispatch import run_batch
-from cavsumo.batch.learning import Lessons
+from cavsumo.batch.learning import Knowledge
 from cavsumo.batch.messages import Answer
 from cavsumo.batch.prepared import OUTPUTS, PreparedBatch
 from cavsumo.batch.progress import Progress
@@ -55,17 +55,17 @@ class BatchRun:
     def begin(self, manifest: Mapping[str, Any], *, overwrite: bool = False) -> None:
         """Start the results file."""
         self._todo = self.prepared.plan.todo()
-        self._lessons = Lessons(self.prepared, {})
+        self._knowledge = Knowledge(self.prepared, {})
         self.recorder.begin(manifest, overwrite=overwrite)
 
     def resume(self, manifest: Mapping[str, Any]) -> None:
         """Take up the recorded rows."""
         self._todo = self.prepared.plan.todo()
-        self._lessons = Lessons(self.prepared, manifest)
+        self._knowledge = Knowledge(self.prepared, manifest)
         for row in self.recorder.resume(manifest, self._todo):
             self.tally.add(row)
-            self._lessons.seen(row)
-        self._lessons.catch_up(self.executor)
+            self._knowledge.seen(row)
+        self._knowledge.catch_up(self.executor)
         recorded = manifest["status"]
         self.status = recorded if recorded in COMPLETE else "interrupted"
 
@@ -78,9 +78,9 @@ class BatchRun:
             for answer in self._answers(self._todo) if reason is None else ():
                 row = self.recorder.write(answer.outcome)
                 self.tally.add(row)
-                learned = self._lessons.learned(row, answer.memory) and self._lessons.due
+                learned = self._knowledge.learned(row, answer.memory) and self._knowledge.due
                 if self._note_outputs() or learned:
-                    self.recorder.checkpoint(self._lessons.facts())
+                    self.recorder.checkpoint(self._knowledge.facts())
                 progress.update(self.tally)
                 reason = rule(self.tally)
                 if reason is not None:
@@ -95,19 +95,21 @@ class BatchRun:
         A learning agent did not learn from such an episode: it starts anew, and its later rows
         change.
         """
-        todo, pupils = _to_retry(self.recorder.csv_file, self.prepared.plan, self._lessons.names)
-        known = self._lessons.known()
-        self._lessons.forget(pupils)
+        todo, relearning = _to_retry(
+            self.recorder.csv_file, self.prepared.plan, self._knowledge.names
+        )
+        known = self._knowledge.known()
+        self._knowledge.forget(relearning)
         replaced: dict[int, Outcome] = {}
         with Progress(len(todo), self.quiet) as progress:
             for answer in self._answers(todo):
                 row = answer.outcome.row
-                self._lessons.learned(row, answer.memory)
+                self._knowledge.learned(row, answer.memory)
                 replaced[row["run"]] = answer.outcome
                 progress.update(self.tally)
         self.cut_short = len(replaced) < len(todo)
-        if self.cut_short and pupils:
-            self._lessons.restore(known)
+        if self.cut_short and relearning:
+            self._knowledge.restore(known)
             raise BatchError("interrupted before the learning agents were done: nothing changed")
         self.recorder.replace(replaced)
         self.tally = Tally()
@@ -118,7 +120,7 @@ class BatchRun:
         """Complete the manifest."""
         self._note_outputs()
         facts = {"episodes": self.tally.rows, "counts": self.tally.all.outcomes}
-        self.recorder.finish(self.status, facts | self._lessons.facts())
+        self.recorder.finish(self.status, facts | self._knowledge.facts())
 
     def _note_outputs(self) -> bool:
         """Record the files that the ego has written in the manifest; returns whether any is new."""
@@ -137,7 +139,7 @@ class BatchRun:
             self.prepared,
             self.executor,
             todo,
-            memories=self._lessons.memories,
+            memories=self._knowledge.memories,
             ahead=LOOK_AHEAD * self.jobs,
             stopped=self.stopped,
         )
@@ -151,14 +153,14 @@ def _to_retry(
     Those are all episodes of such a learner, and all that shared a simulation with an error.
     """
     runs: dict[str, list[int]] = {name: [] for name in learners}
-    errors, pupils, last = set(), set(), -1
+    errors, relearning, last = set(), set(), -1
     for row in rows_of(csv_file):
         last = int(row["run"])
         if row["agent"] in learners:
             runs[row["agent"]].append(last)
         if row["outcome"] == "error":
             errors.add(last // plan.block)
-            pupils |= {row["agent"]} & learners
+            relearning |= {row["agent"]} & learners
     again = {run for group in errors for run in range(group * plan.block, (group + 1) * plan.block)}
-    again |= {run for name in pupils for run in runs[name]}
-    return sorted(run for run in again if run <= last), frozenset(pupils)
+    again |= {run for name in relearning for run in runs[name]}
+    return sorted(run for run in again if run <= last), frozenset(relearning)

@@ -17,7 +17,7 @@ from cavsumo.batch.tally import Row
 CHECKPOINT_EVERY = 20  # learning episodes between two records of the knowledge
 
 
-class Lessons:
+class Knowledge:
     """The knowledge of the learning agents of a batch.
 
     Attributes:

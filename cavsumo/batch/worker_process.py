@@ -18,7 +18,7 @@ from cavsumo.batch.messages import Reply, Task
 from cavsumo.errors import CavsumoError
 from cavsumo.model.objects import take
 from cavsumo.model.offspring import adopt_orphans, kill_descendants
-from cavsumo.model.processes import leash
+from cavsumo.model.processes import end_with_parent
 
 if TYPE_CHECKING:
     from cavsumo.batch.episode_runner import EpisodeRunner
@@ -29,7 +29,7 @@ ALARM_AFTER_S = 30.0  # time after an episode's deadline at which the process en
 
 def main(pipe_fd: int, log_fd: int, parent: int) -> None:
     """Prepare for the batch of the first task, reply, then play."""
-    leash(parent)()
+    end_with_parent(parent)()
     adopt_orphans()
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # the parent decides what Ctrl-C means
     signal.signal(signal.SIGALRM, signal.SIG_DFL)

@@ -11,8 +11,8 @@ from gymnasium.error import ResetNeeded
 from numpy.typing import NDArray
 
 from cavsumo.batch.prepared import PreparedBatch
-from cavsumo.envs.elsewhere import Elsewhere
 from cavsumo.envs.episodes import Episodes, Seen
+from cavsumo.envs.remote import RemoteEpisodes
 from cavsumo.envs.settings import PROCESSES, Roles
 from cavsumo.envs.spaces import ActionSpace, Vector, numbers
 from cavsumo.errors import InputError
@@ -22,14 +22,14 @@ RENDER_MODES = ("rgb_array",)
 
 
 class RunningScenario:
-    """A prepared batch whose scenario is played, here or elsewhere, and its pictures."""
+    """A prepared batch whose scenario is played, in this process or another, and its pictures."""
 
     def __init__(self, prepared: PreparedBatch, roles: Roles, process: str) -> None:
         try:
             choice("process", process, PROCESSES)
         except ValueError as error:
             raise InputError(f"{roles.named}: {error}") from error
-        self.episodes = (Episodes if process == "this" else Elsewhere)(prepared, roles)
+        self.episodes = (Episodes if process == "this" else RemoteEpisodes)(prepared, roles)
         scenario = prepared.plan.scenario
         self.fps = max(1, round(1.0 / (scenario.step_length * roles.hold)))
         self._painter: Any = None

@@ -6,9 +6,9 @@ from pathlib import Path
 from typing import Any
 
 from cavsumo.envs.base import OneLearner
+from cavsumo.envs.commanded import CommandedEgo
 from cavsumo.envs.ego_observations import entries
 from cavsumo.envs.episodes import EGO
-from cavsumo.envs.puppets import PuppetEgo
 from cavsumo.envs.settings import Roles, prepared_for
 from cavsumo.envs.spaces import normalised, observation_space
 
@@ -54,6 +54,6 @@ class EgoEnv(OneLearner):
         )
         prepared = prepared_for(roles, config, settings, one_team=False)
         super().__init__(prepared, roles, learner=EGO, process=process, render_mode=render_mode)
-        ego = PuppetEgo(**driver)  # type: ignore[arg-type]
+        ego = CommandedEgo(**driver)  # type: ignore[arg-type]
         self.action_space = normalised(2 if ego.steers else 1)
         self.observation_space = observation_space(entries(ego.kind))

@@ -23,7 +23,7 @@ VIOLATION = 100.0
 OFF_ROAD = 100.0
 
 
-class EgoLedger:
+class EgoRewardMonitor:
     """The rewards of one episode.
 
     Attributes:

@@ -1,6 +1,6 @@
 """Episodes of one scenario played step by step, with some roles controlled by the caller.
 
-This is the part of an environment that has SUMO; it may live in another process (``elsewhere``).
+This is the part of an environment that has SUMO; it may live in another process (``remote``).
 """
 
 from __future__ import annotations
@@ -12,10 +12,10 @@ from typing import Any, NamedTuple
 
 from cavsumo.agents.observations import TeamObserver
 from cavsumo.batch.prepared import PreparedBatch
+from cavsumo.envs.commanded import CommandedAgent, CommandedEgo
 from cavsumo.envs.ego_observations import EgoObserver
-from cavsumo.envs.ego_rewards import EgoLedger
+from cavsumo.envs.ego_rewards import EgoRewardMonitor
 from cavsumo.envs.events import EventDetector
-from cavsumo.envs.puppets import PuppetAgent, PuppetEgo
 from cavsumo.envs.settings import Roles
 from cavsumo.envs.spaces import Vector
 from cavsumo.errors import SimulationError, SimulationTaken
@@ -67,9 +67,9 @@ class Episodes:
         setup = self._setup
         loop = EpisodeLoop(setup, self._agents, seed)
         scene = loop.scene
-        self._observers = [TeamObserver(scene, team) for team in setup.teams if self._puppets]
+        self._observers = [TeamObserver(scene, team) for team in setup.teams if self._commanded]
         self._ego_observer = EgoObserver(scene)
-        self._rewards = EgoLedger(scene, loop.snapshot, steers=self._steers)
+        self._rewards = EgoRewardMonitor(scene, loop.snapshot, steers=self._steers)
         self._watch = EventDetector(loop, setup.assertions)
         self._loop, self._game_over, self._left = loop, False, False
         info = self._watch.info() | {"seed": seed}
@@ -113,28 +113,28 @@ class Episodes:
         """Set up the scenario, without starting SUMO, and build the agents and the ego."""
         prepared, roles = self._prepared, self._roles
         ego = roles.make_ego(prepared)
-        self._puppet_ego = ego if isinstance(ego, PuppetEgo) else None
-        self._steers = self._puppet_ego is not None and self._puppet_ego.steers
+        self._commanded_ego = ego if isinstance(ego, CommandedEgo) else None
+        self._steers = self._commanded_ego is not None and self._commanded_ego.steers
         setup = make_setup(prepared.plan.scenario, prepared.site, ego)
-        self._puppets: list[PuppetAgent] = []
+        self._commanded: list[CommandedAgent] = []
         if roles.agent is None:
-            self._puppets = [
-                PuppetAgent(roles.actions, sees_background=roles.drawn) for _ in setup.teams
+            self._commanded = [
+                CommandedAgent(roles.actions, sees_background=roles.drawn) for _ in setup.teams
             ]
-        self._agents = self._puppets or prepared.cast.agents(roles.agent or "")
-        teams = [team_name(setup.bodies, team) for team in setup.teams if self._puppets]
+        self._agents = self._commanded or prepared.cast.agents(roles.agent or "")
+        teams = [team_name(setup.bodies, team) for team in setup.teams if self._commanded]
         self._teams = tuple(teams)
-        self._names = (*teams, EGO) if self._puppet_ego else self._teams
+        self._names = (*teams, EGO) if self._commanded_ego else self._teams
         self._end = weakref.finalize(self, _end, setup, os.getpid())  # if nobody calls close
         ego.prepare(setup.mission)
         self._setup = setup
 
     def _tell(self, actions: Mapping[str, Sequence[float]]) -> None:
-        """Tell the puppets what to do."""
-        for name, puppet in zip(self._teams, self._puppets, strict=True):
-            puppet.told = actions[name]
-        if self._puppet_ego is not None:
-            self._puppet_ego.told = actions[EGO]
+        """Set the actions of the agents and of the ego."""
+        for name, commanded in zip(self._teams, self._commanded, strict=True):
+            commanded.told = actions[name]
+        if self._commanded_ego is not None:
+            self._commanded_ego.told = actions[EGO]
 
     def _advance(self, loop: EpisodeLoop, rewards: dict[str, float]) -> None:
         """One timestep, and the rewards of all roles in it."""
@@ -152,7 +152,7 @@ class Episodes:
             self._game_over = feedback[1]
             for name, reward in zip(self._teams, feedback[0], strict=False):
                 rewards[name] += reward
-        if self._puppet_ego is not None:
+        if self._commanded_ego is not None:
             successor = None if self._left else loop.snapshot
             judgements = [a.judgement for a in self._setup.assertions]
             rewards[EGO] += self._rewards.reward(successor, judgements)
@@ -177,7 +177,7 @@ class Episodes:
             name: observer.vector(view)
             for name, observer, view in zip(self._teams, self._observers, views, strict=True)
         }
-        if self._puppet_ego is not None:
+        if self._commanded_ego is not None:
             seen[EGO] = self._ego_observer.vector(loop.ego_view)
         return seen
 

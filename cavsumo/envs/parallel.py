@@ -17,8 +17,8 @@ from cavsumo.agents import observations
 from cavsumo.agents.casting import teams, tester_bodies
 from cavsumo.envs import ego_observations
 from cavsumo.envs.base import RENDER_MODES, RunningScenario, check_render_mode
+from cavsumo.envs.commanded import CommandedEgo
 from cavsumo.envs.episodes import EGO, Seen, team_name
-from cavsumo.envs.puppets import PuppetEgo
 from cavsumo.envs.settings import Roles, prepared_for
 from cavsumo.envs.spaces import (
     ActionSpace,
@@ -91,13 +91,13 @@ class CavsumoParallelEnv(ParallelEnv[str, Vector, Any]):  # type: ignore[misc]
         self.render_mode, self._zero_sum = render_mode, zero_sum
         self._play = RunningScenario(self.prepared, roles, process)
         self.metadata = {**type(self).metadata, "render_fps": self._play.fps}  # type: ignore[misc]
-        self._spaces = self._made_spaces(PuppetEgo(**driver), actions)  # type: ignore[arg-type]
+        self._spaces = self._made_spaces(CommandedEgo(**driver), actions)  # type: ignore[arg-type]
         self.possible_agents = list(self._spaces)
         self.agents: list[str] = []
         self._np_random: np.random.Generator | None = None
 
     def _made_spaces(
-        self, ego: PuppetEgo, actions: str
+        self, ego: CommandedEgo, actions: str
     ) -> dict[str, tuple[spaces.Box, ActionSpace]]:
         """The spaces of observations and actions of each agent."""
         scenario = self.prepared.plan.scenario

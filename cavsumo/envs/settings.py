@@ -10,7 +10,7 @@ from typing import Any
 from cavsumo.batch.prepared import PreparedBatch, prepare
 from cavsumo.egos import make_ego
 from cavsumo.egos.base import Ego
-from cavsumo.envs.puppets import ACTIONS, PuppetEgo
+from cavsumo.envs.commanded import ACTIONS, CommandedEgo
 from cavsumo.errors import InputError, UnknownName
 from cavsumo.model.bodies import WALKING
 from cavsumo.model.checks import choice, whole
@@ -29,7 +29,7 @@ class Roles:
 
     Attributes:
         agent: the registered agent that plays the testers; None when the caller controls them.
-        ego: keywords of the ``PuppetEgo``; None when the scenario's ego drives.
+        ego: keywords of the ``CommandedEgo``; None when the scenario's ego drives.
         until: "game": an episode ends when the tester's game does, at its goal or in a dead end;
             "verdict": when the assertions have decided, as in ``cavsumo run``.
         hold: for how many timesteps an action lasts.
@@ -56,7 +56,7 @@ class Roles:
     def make_ego(self, prepared: PreparedBatch) -> Ego:
         """The ego of the environment."""
         if self.ego is not None:
-            return PuppetEgo(**self.ego)
+            return CommandedEgo(**self.ego)
         scenario = prepared.plan.scenario
         return make_ego(scenario.ego, scenario.ego_params)
 
@@ -86,7 +86,7 @@ def prepared_for(
     plan = plan_from(settings | {"agents": (roles.agent or "noop",)}, source)
     if roles.actions == "targets" and plan.scenario.kind not in WALKING:
         raise InputError(f"{source}: actions 'targets' are for {' and '.join(WALKING)}s only")
-    prepared = prepare(plan, PuppetEgo(**roles.ego) if roles.ego is not None else None)
+    prepared = prepare(plan, CommandedEgo(**roles.ego) if roles.ego is not None else None)
     if prepared.cast.learners:
         raise InputError(
             f"{source}: agent {roles.agent} learns from episode to episode, so a seed would not "

@@ -14,7 +14,7 @@ PR_SET_PDEATHSIG = 1  # Linux, prctl(2)
 OUTER_PATH = "CAVSUMO_OUTER_PYTHONPATH"  # what PYTHONPATH was before it was set for our own
 
 
-def leash(parent: int) -> Callable[[], None]:
+def end_with_parent(parent: int) -> Callable[[], None]:
     """A function for a new process to call, so that Linux kills it when its parent dies.
 
     It is made before the process, so that no library is loaded between fork and exec.

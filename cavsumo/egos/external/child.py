@@ -13,7 +13,7 @@ from cavsumo.egos.external.link import Link, Tail
 from cavsumo.errors import EgoError
 from cavsumo.model.offspring import kill_descendants
 from cavsumo.model.own_folders import OwnFolder
-from cavsumo.model.processes import ending, leash, outer_environment
+from cavsumo.model.processes import end_with_parent, ending, outer_environment
 
 GRACE_S = 1.0  # time that it has to end by itself
 GLANCE_S = 0.01  # interval of checks whether it has
@@ -27,10 +27,10 @@ class Child(Link):
     """
 
     def __init__(self, words: Sequence[str], tail: Tail) -> None:
-        put_on_leash = leash(os.getpid())
+        follow_parent = end_with_parent(os.getpid())
 
         def before_exec() -> None:
-            put_on_leash()
+            follow_parent()
             signal.signal(signal.SIGINT, signal.SIG_DFL)  # a process of cavsumo ignores it
 
         self._folder = OwnFolder("ego")

@@ -21,7 +21,7 @@ CONTROLS = ("acceleration", "drive")
 ACTIONS = ("effectors", "targets")
 
 
-class PuppetAgent(Agent):
+class CommandedAgent(Agent):
     """A tester agent whose action is set before it chooses.
 
     Args:
@@ -55,7 +55,7 @@ class PuppetAgent(Agent):
         )
 
 
-class PuppetEgo(Ego):
+class CommandedEgo(Ego):
     """An ego whose action is set before it acts.
 
     Args:

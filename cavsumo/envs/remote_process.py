@@ -11,12 +11,12 @@ from typing import Any
 
 from cavsumo.batch.worker_process import divert_output
 from cavsumo.errors import CavsumoError, SimulationError
-from cavsumo.model.processes import leash
+from cavsumo.model.processes import end_with_parent
 
 
 def main(pipe_fd: int, parent: int) -> None:
     """Serve calls until the pipe closes."""
-    leash(parent)()
+    end_with_parent(parent)()
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     pipe = Connection(pipe_fd)
     with tempfile.TemporaryFile() as log:  # SUMO's output

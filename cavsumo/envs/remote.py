@@ -24,7 +24,7 @@ from cavsumo.model.processes import inner_environment
 from cavsumo.model.snapshot import Snapshot
 
 
-class Elsewhere:
+class RemoteEpisodes:
     """``Episodes`` in a child process, which ``reset`` starts when there is none."""
 
     def __init__(self, prepared: PreparedBatch, roles: Roles) -> None:
@@ -84,7 +84,7 @@ class _Child:
         numbers = str(theirs.fileno()), str(os.getpid())
         try:
             self._process = subprocess.Popen(
-                [sys.executable, "-P", "-m", "cavsumo.envs.elsewhere_process", *numbers],
+                [sys.executable, "-P", "-m", "cavsumo.envs.remote_process", *numbers],
                 pass_fds=(theirs.fileno(),),
                 cwd=prepared.folder,
                 env=inner_environment(),
