@@ -1,4 +1,4 @@
-"""Shards put together: the results file that a single run would have written."""
+"""Merging shards into the results file that a single run would have written."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ Numbered = tuple[int, int, dict[str, str]]  # run, which part, row
 
 
 def merged(parts: Sequence[Path], output: Path, *, overwrite: bool) -> Ended:
-    """Check that the parts make a whole, then write it; raises ResultsError if they do not."""
+    """Check that the parts are complete, then write the whole; raises ResultsError if not."""
     if output.resolve() in [part.resolve() for part in parts]:
         raise ResultsError(f"output {str(output)!r}: is one of the parts")
     whole = _whole_manifest(parts)
@@ -116,7 +116,7 @@ def _trace_of(part: Path, row: dict[str, str]) -> str:
 
 
 def _log_of(part: Path, run: int) -> str:
-    """What the ego printed in an episode, empty for nothing."""
+    """The ego's output in an episode, empty for none."""
     file = inside(part, ego_log_name(part, run))
     try:
         return file.read_text(encoding="utf-8") if file.exists() else ""

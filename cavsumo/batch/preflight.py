@@ -1,4 +1,4 @@
-"""A batch that was checked: what is played into which file, from the start or from where it is."""
+"""The check of a batch: its plan and its file, new or continued."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ UNESSENTIAL = frozenset({"deadline_s"})  # settings without influence on rows th
 
 @dataclass(frozen=True)
 class Manner:
-    """How a run treats the results that lie there, and what it says.
+    """How a run treats existing results, and what it prints.
 
     Attributes:
         resume: go on where they end.
@@ -30,7 +30,7 @@ class Manner:
         scratch: the results file is not one that the user named: a finished batch there is
             replaced, and that is said.
         quiet: no progress, no summary.
-        exit_zero: a violation is no failure.
+        exit_zero: exit with 0 after a violation.
     """
 
     resume: bool = False
@@ -46,7 +46,7 @@ class CheckedBatch:
     """A batch ready to be played.
 
     Attributes:
-        name: which part of a study it is; empty for none.
+        name: its name in a study; empty for none.
         output: its results file.
         prepared, manifest: what is played.
         recorded: the manifest of the batch to go on with, None for a new one.
@@ -61,7 +61,7 @@ class CheckedBatch:
     replaced: int = 0
 
     def without(self, outputs: Sequence[str]) -> CheckedBatch:
-        """The same batch, but some files are what its ego writes."""
+        """The same batch, with some files as outputs of its ego."""
         prepared = self.prepared.without(outputs)
         return dataclasses.replace(
             self,
@@ -71,7 +71,7 @@ class CheckedBatch:
 
 
 def checked(parts: Sequence[Part], output: Path, manner: Manner) -> list[CheckedBatch]:
-    """Check all parts of a run before any is played; raises InputError in one sentence."""
+    """Check all batches of a run before any is played; raises InputError in one sentence."""
     batches = [_checked(part, part.output(output), manner) for part in parts]
     return [_in_place(batch, manner) for batch in batches]
 
@@ -121,7 +121,7 @@ def episodes_of(manifest: Mapping[str, Any]) -> int:
 
 
 def _checked(part: Part, output: Path, manner: Manner) -> CheckedBatch:
-    """Check one part."""
+    """Check one batch."""
     _check_output(output)
     recorded = _recorded(output, manner)
     source = f"run: {part.name}" if part.name else "run"
@@ -136,7 +136,7 @@ def _checked(part: Part, output: Path, manner: Manner) -> CheckedBatch:
 
 
 def _check_output(output: Path) -> None:
-    """Refuse what cannot become a results file."""
+    """Refuse a path that cannot become a results file."""
     if not output.parent.is_dir():
         raise InputError(f"output {str(output)!r}: no such folder {str(output.parent)!r}")
     if output.suffix != ".csv":
@@ -146,9 +146,9 @@ def _check_output(output: Path) -> None:
 
 
 def _recorded(output: Path, manner: Manner) -> dict[str, Any] | None:
-    """The manifest of the batch to go on with, None for a new one.
+    """The manifest of the batch to continue, None for a new one.
 
-    With ``resume`` there may be nothing yet, so that the same command starts and goes on.
+    With ``resume`` there may be no results yet, so that the same command starts and continues.
     """
     if not (manner.resume or manner.retry_errors):
         return None
@@ -164,7 +164,7 @@ def recorded_outputs(recorded: Mapping[str, Any] | None) -> list[str]:
 
 
 def recorded_settings(recorded: Mapping[str, Any] | None) -> dict[str, Any]:
-    """The settings of a recorded plan; what is not given again stays as it was."""
+    """The settings of a recorded plan; settings that are not given again are kept."""
     if recorded is None:
         return {}
     try:

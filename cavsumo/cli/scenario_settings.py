@@ -1,4 +1,4 @@
-"""The words of a command line as the settings of a scenario, or of several."""
+"""The options of a command line as the settings of one scenario or several."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from cavsumo.model.study import Part, at_each, read_study
 
 
 def parts_of(options: argparse.Namespace) -> list[Part]:
-    """The batches of a run: the file's, overruled by the command line."""
+    """The batches of a run: those of the file, overridden by the command line."""
     found = settings_of(options)
     if options.config:  # which says where it plays
         parts = read_study(Path(options.config), found)

@@ -1,4 +1,4 @@
-"""``cavsumo run``: one batch or several, from the start or from where they are."""
+"""``cavsumo run``: one batch or several, new or continued."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from cavsumo.model.study import Part
 
 
 def run(settings: Mapping[str, Any], output: Path, means: Means, manner: Manner) -> int:
-    """Play a batch; everything is checked before anything is written."""
+    """Play a batch; all checks precede the first written file."""
     return run_study([Part("", dict(settings))], output, means, manner)
 
 
@@ -45,12 +45,12 @@ def exit_status(ended: Sequence[Ended], interrupted: bool, exit_zero: bool) -> i
 
 
 def announce(batch: CheckedBatch, jobs: int) -> None:
-    """Say on stderr what was chosen."""
+    """Print the chosen scenario on stderr."""
     print(_first_line(batch, jobs), file=sys.stderr)
 
 
 def _replacement(batch: CheckedBatch) -> str:
-    """What is lost by a batch, for the user to see."""
+    """A line about the results that a batch replaces."""
     return (
         f"cavsumo: {str(batch.output)!r}: another batch of {batch.replaced} episodes is replaced; "
         "-o FILE keeps the next one"
@@ -58,7 +58,7 @@ def _replacement(batch: CheckedBatch) -> str:
 
 
 def _first_line(batch: CheckedBatch, jobs: int) -> str:
-    """What was chosen, for the user to see."""
+    """The chosen scenario in a line."""
     prepared = batch.prepared
     plan, scenario, route = prepared.plan, prepared.plan.scenario, prepared.site.route
     ego = make_ego(scenario.ego, scenario.ego_params)

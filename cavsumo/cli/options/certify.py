@@ -61,7 +61,7 @@ def _add_test(group: Any) -> None:
     add(
         "--open-loop",
         action="store_true",
-        help="of a run: its recorded actions, whatever happens, instead of its agent",
+        help="of a run: its recorded actions, in any situation, instead of its agent",
     )
     add(
         "--param",

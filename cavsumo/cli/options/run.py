@@ -43,7 +43,7 @@ def _fill(run: argparse.ArgumentParser) -> None:
 
 
 def _of_several(setting: Setting) -> dict[str, Any]:
-    """What makes of the option of one setting one that is given for each of several batches."""
+    """Keywords of an option that is given once for each of several batches."""
     from cavsumo.cli.setting_options import help_of
 
     return {"action": "append", "help": f"{help_of(setting)}; repeat for a batch on each"}
