@@ -407,6 +407,8 @@ def test_objects_play_the_same_in_any_number_of_processes(tmp_path: Path) -> Non
     assert re.fullmatch(r"object:Tiring@[0-9a-f]{12}", one.rows["ego"][0])
     assert re.match(r"object:apart@\w+=held object:Patient@\w+=held", one.rows["verdicts"][0])
     assert one.manifest["plan"]["agents"][0].startswith("Sprinter=object:Sprinter@")
+    again = cavsumo.run(one.scenario, agents="timing", runs=1)
+    assert again.objects == one.objects[1:]
     kept = one.replay(2, recorded=True).frames
     assert one.replay(2).frames.equals(kept)
 
