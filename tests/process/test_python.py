@@ -349,6 +349,25 @@ class Sprinter(cavsumo.Agent):
         return tuple(cavsumo.Action(throttle, 0.0) for _ in self.own(snapshot))
 
 
+class Counting(cavsumo.Agent):
+    """A learner: it walks faster from lesson to lesson."""
+
+    learns = True
+
+    def __init__(self) -> None:
+        self.steps = 0
+
+    def choose_action(self, snapshot: Any) -> tuple[cavsumo.Action, ...]:
+        self.steps += 1
+        return tuple(cavsumo.Action(min(1.4, self.steps / 100), 0.0) for _ in self.own(snapshot))
+
+    def recall(self) -> int:
+        return self.steps
+
+    def remember(self, memory: int) -> None:
+        self.steps = memory
+
+
 class Tiring:
     """An ego that drives slower from answer to answer."""
 
@@ -384,7 +403,7 @@ def of_objects(**more: Any) -> Results:
     return cavsumo.run(
         "pedestrians",
         routes="none",
-        agents=[Sprinter(2.0), "timing"],
+        agents=[Sprinter(2.0), Counting(), "timing"],
         ego=Tiring(),
         assertions=[apart, Patient(), "reaction-zone"],
         runs=2,
@@ -403,14 +422,15 @@ def test_objects_play_the_same_in_any_number_of_processes(tmp_path: Path) -> Non
     ]
     assert list(traces(one.file).values()) == list(traces(two.file).values())
     assert one.rows["error"].isna().all()
-    assert one.rows["agent"].tolist() == ["Sprinter", "timing"] * 2
+    assert one.rows["agent"].tolist() == ["Sprinter", "Counting", "timing"] * 2
     assert re.fullmatch(r"object:Tiring@[0-9a-f]{12}", one.rows["ego"][0])
     assert re.match(r"object:apart@\w+=held object:Patient@\w+=held", one.rows["verdicts"][0])
     assert one.manifest["plan"]["agents"][0].startswith("Sprinter=object:Sprinter@")
     again = cavsumo.run(one.scenario, agents="timing", runs=1)
-    assert again.objects == one.objects[1:]
-    kept = one.replay(2, recorded=True).frames
-    assert one.replay(2).frames.equals(kept)
+    assert again.objects == one.objects[2:]
+    assert one.manifest["learned"]["Counting"] == [one.rows["steps"][[1, 4]].sum()] * 2
+    kept = one.replay(4, recorded=True).frames
+    assert one.replay(4).frames.equals(kept)
 
 
 def test_results_of_objects_outlive_their_session(tmp_path: Path) -> None:
