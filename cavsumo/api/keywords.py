@@ -7,8 +7,10 @@ import re
 from collections.abc import Mapping
 from typing import Any, get_args
 
+import numpy
+
 from cavsumo.errors import InputError
-from cavsumo.model.objects import SentObject, sent
+from cavsumo.model.objects import SentObject, objects_among, sent
 from cavsumo.model.scenario import Scenario
 from cavsumo.model.scenario.fields import settings as offered
 
@@ -71,11 +73,16 @@ def _agent(agent: Any, objects: list[SentObject]) -> str:
 def _named(thing: Any, objects: list[SentObject]) -> str:
     """The name of an agent, an ego or an assertion, as given or of the object."""
     if isinstance(thing, str):
+        objects += objects_among([thing])  # of a scenario that was played before
         return thing
     objects.append(sent(thing))
     return objects[-1].name
 
 
 def _text(value: Any) -> Any:
-    """A path as text, anything else as it is."""
-    return os.fspath(value) if isinstance(value, os.PathLike) else value
+    """A path as text, a number of numpy as one of Python, anything else as it is."""
+    if isinstance(value, os.PathLike):
+        return os.fspath(value)
+    if isinstance(value, Mapping):
+        return {key: _text(inner) for key, inner in value.items()}
+    return value.item() if isinstance(value, numpy.generic) else value

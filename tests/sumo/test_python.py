@@ -4,12 +4,9 @@ from __future__ import annotations
 
 import gc
 import math
-import os
 import re
 import shutil
 import signal
-import subprocess
-import sys
 import threading
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
@@ -17,11 +14,11 @@ from typing import Any
 
 import pandas
 import pytest
-from support import content, rows, traces
+from own_objects import Sprinter, Tiring, of_objects
+from support import content, rows, traces, untold
 
 import cavsumo
 from cavsumo import Results
-from cavsumo.api.results import TemporaryFolder
 from cavsumo.batch import progress
 from cavsumo.batch.worker import close_all
 from cavsumo.cli import main
@@ -49,20 +46,6 @@ def results() -> Results:
 
 
 # The package
-
-
-def test_importing_cavsumo_loads_nothing_heavy() -> None:
-    """Neither numpy nor libsumo nor pandas, until a name is used; the names are listed."""
-    heavy = "{'numpy', 'libsumo', 'pandas', 'pydantic', 'rich', 'cloudpickle'}"
-    code = (
-        f"import sys, cavsumo; found = {heavy} & set(sys.modules); assert not found, found\n"
-        "assert set(cavsumo.__all__) <= set(dir(cavsumo))\n"
-        "cavsumo.InputError; assert 'numpy' not in sys.modules\n"
-        "from cavsumo import *; run, load, Scenario\n"
-        "assert 'libsumo' not in sys.modules"
-    )
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=120)
-    assert done.returncode == 0, done.stderr
 
 
 def test_the_public_names_are_those_of_the_docs() -> None:
@@ -112,19 +95,6 @@ def test_nothing_is_said_or_left_behind(
     assert not folder.exists()
 
 
-def test_a_fork_leaves_the_temporary_folder_alone() -> None:
-    """It is that of the process that played."""
-    folder = TemporaryFolder()
-    child = os.fork()
-    if child == 0:
-        folder.close()
-        os._exit(0)
-    assert os.waitpid(child, 0)[1] == 0
-    assert folder.path.is_dir()
-    folder.close()
-    assert not folder.path.exists()
-
-
 def test_a_scenario_file_and_an_output_are_taken(by_command: Path, tmp_path: Path) -> None:
     """The keywords win over the file, an executor plays, and the results lie where wanted."""
     config = tmp_path / "scenario.toml"
@@ -133,9 +103,7 @@ def test_a_scenario_file_and_an_output_are_taken(by_command: Path, tmp_path: Pat
     with ThreadPoolExecutor(2) as executor:
         played = cavsumo.run(config=config, output=output, runs=2, executor=executor)
     close_all()
-    assert [row | {"trace": ""} for row in rows(output)] == [
-        row | {"trace": ""} for row in rows(by_command)[:4]
-    ]
+    assert untold(rows(output)) == untold(rows(by_command)[:4])
     assert cavsumo.load(output).rows.equals(played.rows)
     assert read_manifest(output)["call"].startswith("cavsumo.run(agents=['timing', 'proximity']")
     again = cavsumo.run(config=config, output=output, runs=3, resume=True)
@@ -147,39 +115,6 @@ def test_a_scenario_is_played_again_with_another_ego(results: Results) -> None:
     other = cavsumo.run(results.scenario, ego="time-gap", agents="timing", runs=1, seed=3)
     assert other.scenario.model_copy(update={"ego": "sumo"}) == results.scenario
     assert other.rows["ego"].tolist() == ["time-gap"]
-
-
-def test_batches_at_the_same_time_do_not_end_each_other() -> None:
-    """One that is over early ends its own processes only."""
-    begun: list[Results] = []
-
-    def play(runs: int) -> None:
-        begun.append(cavsumo.run("pedestrians", routes="none", end=10.0, runs=runs))
-
-    threads = [threading.Thread(target=play, args=(runs,)) for runs in (1, 15)]
-    for thread in threads:
-        thread.start()
-    for thread in threads:
-        thread.join()
-    assert sorted(map(len, begun)) == [1, 15]
-    assert all(played.rows["error"].isna().all() for played in begun)
-
-
-def test_a_script_needs_no_guard(tmp_path: Path) -> None:
-    """Two processes play, with an ego of the script's, and the script itself runs once."""
-    (tmp_path / "script.py").write_text(
-        "import cavsumo\n"
-        "print('once')\n"
-        "class Keeper:\n"
-        "    depart_speed = 5.0\n"
-        "    def act(self, snapshot):\n"
-        "        return cavsumo.Acceleration(max(-4.0, min(2.0, 6.0 - snapshot.ego.v)))\n"
-        "played = cavsumo.run('pedestrians', ego=Keeper(), runs=4, jobs=2, end=2.0)\n"
-        "print(len(played), played.rows['error'].isna().all())\n"
-    )
-    words = [sys.executable, "script.py"]
-    done = subprocess.run(words, cwd=tmp_path, capture_output=True, text=True, timeout=300)
-    assert (done.stdout, done.stderr) == ("once\n4 True\n", "")
 
 
 def test_an_interrupt_keeps_what_ran(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -335,80 +270,6 @@ def test_damaged_results_are_one_sentence(by_command: Path, tmp_path: Path) -> N
 
 
 # Objects
-
-
-class Sprinter(cavsumo.Agent):
-    """Walks faster from decision to decision, which no later episode may notice."""
-
-    def __init__(self, pace: float = 1.0) -> None:
-        self.pace, self.decisions = pace, 0
-
-    def choose_action(self, snapshot: Any) -> tuple[cavsumo.Action, ...]:
-        self.decisions += 1
-        throttle = min(1.4, self.pace * self.decisions / 100)
-        return tuple(cavsumo.Action(throttle, 0.0) for _ in self.own(snapshot))
-
-
-class Tiring:
-    """An ego that drives slower from answer to answer."""
-
-    depart_speed = 6.0
-
-    def __init__(self, speed: float = 6.0) -> None:
-        self.speed, self.answers = speed, 0
-
-    def act(self, snapshot: Any) -> cavsumo.Acceleration:
-        self.answers += 1
-        wanted = self.speed - 0.01 * self.answers
-        return cavsumo.Acceleration(max(-4.0, min(2.0, wanted - snapshot.ego.v)))
-
-
-class Patient:
-    """An assertion whose margin shrinks from snapshot to snapshot."""
-
-    def __init__(self) -> None:
-        self.seen = 0
-
-    def observe(self, snapshot: Any) -> float:
-        self.seen += 1
-        return 1000.0 - self.seen
-
-
-def apart(snapshot: Any) -> float | None:
-    """The ego keeps below 50 m/s."""
-    return 50.0 - float(snapshot.ego.v) if snapshot.time > 1.0 else None
-
-
-def of_objects(**more: Any) -> Results:
-    """A batch of them."""
-    return cavsumo.run(
-        "pedestrians",
-        routes="none",
-        agents=[Sprinter(2.0), "timing"],
-        ego=Tiring(),
-        assertions=[apart, Patient(), "reaction-zone"],
-        runs=2,
-        testers=2,
-        end=4.0,
-        trace="all",
-        **more,
-    )
-
-
-def test_objects_play_the_same_in_any_number_of_processes(tmp_path: Path) -> None:
-    """They keep state, every episode has a fresh copy, and rows and files name them."""
-    one, two = of_objects(), of_objects(jobs=2, output=tmp_path / "two.csv")
-    assert [row | {"trace": ""} for row in rows(one.file)] == [
-        row | {"trace": ""} for row in rows(two.file)
-    ]
-    assert list(traces(one.file).values()) == list(traces(two.file).values())
-    assert one.rows["error"].isna().all()
-    assert one.rows["agent"].tolist() == ["Sprinter", "timing"] * 2
-    assert re.fullmatch(r"object:Tiring@[0-9a-f]{12}", one.rows["ego"][0])
-    assert re.match(r"object:apart@\w+=held object:Patient@\w+=held", one.rows["verdicts"][0])
-    assert one.manifest["plan"]["agents"][0].startswith("Sprinter=object:Sprinter@")
-    kept = one.replay(2, recorded=True).frames
-    assert one.replay(2).frames.equals(kept)
 
 
 def test_results_of_objects_outlive_their_session(tmp_path: Path) -> None:
