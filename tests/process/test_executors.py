@@ -210,6 +210,17 @@ def test_dask_plays_what_one_process_plays(
         assert played(prepared, executor) == quiet
 
 
+def test_a_dask_client_of_the_users_is_an_executor(prepared: PreparedBatch, cluster: Any) -> None:
+    """It plays, as many at a time as it has threads, and stays open."""
+    distributed = pytest.importorskip("distributed")
+    with distributed.Client(cluster) as client:
+        with opened(Means(executor=client)) as (executor, jobs):
+            assert jobs == 2
+            outcomes = run_batch(prepared, executor, range(2))
+            assert [answer.outcome.row["run"] for answer in outcomes] == [0, 1]
+        assert client.status == "running"
+
+
 def test_a_dask_worker_that_is_killed_loses_nothing(
     quiet: list[Any],
     cluster: Any,
