@@ -1,7 +1,7 @@
 """Episodes that are played back: the testers begin where they began and do what they did.
 
 A record is made from an episode in memory (``simulation.playback``) or from its trace
-(``results.recording``), and played by agents of this file, whatever the ego does now.
+(``results.recording``), and played by agents of this file, independently of the ego.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ Teams = Sequence[Sequence[int]]  # for each agent the indices of its bodies
 
 @dataclass(frozen=True)
 class Recorded:
-    """What an episode has to be given to be played back; all else follows from it.
+    """Data that determine an episode when it is played back.
 
     Attributes:
         seed: of the episode.
@@ -45,7 +45,7 @@ class Recorded:
     approaches: Sequence[str] = ()
 
     def memories(self, teams: Teams) -> tuple[dict[str, Any], ...]:
-        """What the agents that play it back have to remember, as plain data."""
+        """The knowledge of the agents that play it back, as plain data."""
         return tuple(
             {
                 "starts": [self.starts[i] for i in team if self.starts],
@@ -106,8 +106,8 @@ def action_between(
 ) -> tuple[float, float]:
     """Throttle and steering that lead a body from one state (x, y, v, o) to the next (eqs 20-22).
 
-    A speed at its limit comes from the effector at its limit, so that it is met exactly; where a
-    turn is lost in rounding there is none.
+    A speed at its limit comes from the effector at its limit, so that it is reproduced exactly; a
+    turn below the rounding error is none.
     """
     _, _, v, o = before
     _, _, v_next, o_next = after

@@ -1,4 +1,4 @@
-"""Where episodes are played: in processes of this machine, or wherever dask has workers."""
+"""Executors of episodes: processes of this machine, or dask's workers."""
 
 from __future__ import annotations
 
@@ -13,17 +13,17 @@ from typing import Any
 from cavsumo.batch.worker import Worker, close_all, join_group
 from cavsumo.errors import InputError
 
-CONNECT_S = 10.0  # how long to look for a scheduler, and for its first worker
+CONNECT_S = 10.0  # time limits for finding a scheduler, and its first worker
 EXECUTORS = ("local", "dask")
 
 
 @dataclass(frozen=True)
 class Means:
-    """How episodes are played, which never changes what comes out.
+    """The means of playing episodes, which never change the results.
 
     Attributes:
-        jobs: how many at a time; None for what the executor has.
-        executor: "local" or "dask", or an executor that is there already: one of
+        jobs: how many at a time; None for the executor's number.
+        executor: "local" or "dask", or an existing executor: one of
             ``concurrent.futures``, or a dask ``Client``.
         scheduler: address of dask's scheduler.
     """
@@ -35,7 +35,7 @@ class Means:
     def __post_init__(self) -> None:
         if self.jobs is not None and self.jobs < 1:
             raise InputError(f"jobs: expected a number of at least 1, got {self.jobs}")
-        ours = isinstance(self.executor, str)
+        ours = isinstance(self.executor, str) and self.executor in EXECUTORS
         if not (ours or isinstance(self.executor, Executor) or _is_client(self.executor)):
             raise InputError(
                 "executor: expected a concurrent.futures.Executor or a dask Client, got "
@@ -49,7 +49,7 @@ class Means:
 
 @contextmanager
 def opened(means: Means) -> Iterator[tuple[Executor, int]]:
-    """An executor and how many episodes it plays at a time; what was started is ended on leaving.
+    """An executor and how many episodes it plays at a time; on leaving, started ones are ended.
 
     An executor of the user's is left running.
     """
@@ -66,7 +66,7 @@ def opened(means: Means) -> Iterator[tuple[Executor, int]]:
 
 
 def _is_client(executor: Any) -> bool:
-    """Whether this is a client of dask, which need not be installed."""
+    """Whether an object is a client of dask, which need not be installed."""
     return hasattr(executor, "get_executor") and hasattr(executor, "ncores")
 
 
@@ -79,7 +79,7 @@ def local_executor(jobs: int) -> Iterator[Executor]:
         yield executor
     finally:
         executor.shutdown(wait=False, cancel_futures=True)
-        close_all(workers)  # what is still played is not wanted any more
+        close_all(workers)  # episodes that still run are no longer needed
         executor.shutdown(wait=True)
 
 

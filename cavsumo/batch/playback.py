@@ -24,7 +24,7 @@ AGAIN = "playback"  # label of the agent in a plan that is played back
 
 
 def recording_of(record: Record, trace: Trace) -> Recorded:
-    """What it takes to play an episode back, by its trace; raises ResultsError where it is damaged.
+    """The data for playing an episode back, from its trace; raises ResultsError if damaged.
 
     A trace of format 1 holds no actions: those that lead from frame to frame are computed, which
     is not always exact, and the starts are drawn again.
@@ -97,7 +97,7 @@ def playback_job(record: Record) -> Job:
 
 
 def _recording(record: Record) -> Recorded:
-    """What a record is played back from; raises InputError when it holds no actions."""
+    """The recording of a record; raises InputError when it holds no actions."""
     run, trace = record.run, record.trace
     if trace is None:
         raise InputError(f"--playback: no trace was kept of run {run}")

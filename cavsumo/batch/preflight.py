@@ -1,4 +1,4 @@
-"""A batch that was checked: what is played into which file, from the start or from where it is."""
+"""The check of a batch: its plan and its file, new or continued."""
 
 from __future__ import annotations
 
@@ -16,22 +16,27 @@ from cavsumo.results.provenance import differences
 from cavsumo.results.reading import check_replaceable, read_manifest
 from cavsumo.results.writing import check_free
 
+UNESSENTIAL = frozenset({"deadline_s"})  # settings without influence on rows that are no errors
+
 
 @dataclass(frozen=True)
 class Manner:
-    """How a run treats the results that lie there, and what it says.
+    """How a run treats existing results, and what it prints.
 
     Attributes:
         resume: go on where they end.
         retry_errors: play the episodes again that could not be played.
-        overwrite: start again even in place of an unfinished batch.
+        overwrite: start again even in place of an unfinished batch, or of another finished one.
+        scratch: the results file is not one that the user named: a finished batch there is
+            replaced, and that is said.
         quiet: no progress, no summary.
-        exit_zero: a violation is no failure.
+        exit_zero: exit with 0 after a violation.
     """
 
     resume: bool = False
     retry_errors: bool = False
     overwrite: bool = False
+    scratch: bool = False
     quiet: bool = False
     exit_zero: bool = False
 
@@ -41,10 +46,11 @@ class CheckedBatch:
     """A batch ready to be played.
 
     Attributes:
-        name: which part of a study it is; empty for none.
+        name: its name in a study; empty for none.
         output: its results file.
         prepared, manifest: what is played.
         recorded: the manifest of the batch to go on with, None for a new one.
+        replaced: how many episodes of another finished batch lie in its place.
     """
 
     name: str
@@ -52,9 +58,10 @@ class CheckedBatch:
     prepared: PreparedBatch
     manifest: Mapping[str, Any]
     recorded: Mapping[str, Any] | None
+    replaced: int = 0
 
     def without(self, outputs: Sequence[str]) -> CheckedBatch:
-        """The same batch, but some files are what its ego writes."""
+        """The same batch, with some files as outputs of its ego."""
         prepared = self.prepared.without(outputs)
         return dataclasses.replace(
             self,
@@ -64,17 +71,57 @@ class CheckedBatch:
 
 
 def checked(parts: Sequence[Part], output: Path, manner: Manner) -> list[CheckedBatch]:
-    """Check all parts of a run before any is played; raises InputError in one sentence."""
+    """Check all batches of a run before any is played; raises InputError in one sentence."""
     batches = [_checked(part, part.output(output), manner) for part in parts]
-    for batch in batches:
-        check_free(batch.output)
-        if batch.recorded is None and not manner.overwrite:
-            check_replaceable(batch.output)
-    return batches
+    return [_in_place(batch, manner) for batch in batches]
+
+
+def _in_place(batch: CheckedBatch, manner: Manner) -> CheckedBatch:
+    """A batch whose place may be taken: by going on, or instead of what lies there."""
+    check_free(batch.output)
+    if batch.recorded is not None:
+        return batch
+    if not manner.overwrite:
+        check_replaceable(batch.output)
+    other = other_batch(batch.output, batch.manifest)
+    if other is None:
+        return batch
+    if not (manner.overwrite or manner.scratch):
+        check_kept(batch.output, batch.manifest)
+    return dataclasses.replace(batch, replaced=episodes_of(other))
+
+
+def check_kept(output: Path, manifest: Mapping[str, Any]) -> None:
+    """Raise ResultsError where another finished batch lies in a file that the user named."""
+    other = other_batch(output, manifest)
+    if other is not None:
+        different = next(differences(other, manifest, apart=UNESSENTIAL))
+        raise ResultsError(
+            f"results {str(output)!r}: hold another finished batch of {episodes_of(other)} "
+            f"episodes ({different}); --overwrite replaces it"
+        )
+
+
+def other_batch(output: Path, manifest: Mapping[str, Any]) -> dict[str, Any] | None:
+    """The manifest of another batch that has rows in a file; None where the same one has."""
+    if not (output.is_file() and output.stat().st_size > 0):
+        return None
+    try:
+        there = read_manifest(output)
+    except ResultsError:  # to be replaced although it is no batch
+        return None
+    other = any(differences(there, manifest, apart=UNESSENTIAL))
+    return there if other and episodes_of(there) else None
+
+
+def episodes_of(manifest: Mapping[str, Any]) -> int:
+    """How many episodes a finished batch has."""
+    count = manifest.get("episodes")
+    return count if isinstance(count, int) else 0
 
 
 def _checked(part: Part, output: Path, manner: Manner) -> CheckedBatch:
-    """Check one part."""
+    """Check one batch."""
     _check_output(output)
     recorded = _recorded(output, manner)
     source = f"run: {part.name}" if part.name else "run"
@@ -89,7 +136,7 @@ def _checked(part: Part, output: Path, manner: Manner) -> CheckedBatch:
 
 
 def _check_output(output: Path) -> None:
-    """Refuse what cannot become a results file."""
+    """Refuse a path that cannot become a results file."""
     if not output.parent.is_dir():
         raise InputError(f"output {str(output)!r}: no such folder {str(output.parent)!r}")
     if output.suffix != ".csv":
@@ -99,9 +146,9 @@ def _check_output(output: Path) -> None:
 
 
 def _recorded(output: Path, manner: Manner) -> dict[str, Any] | None:
-    """The manifest of the batch to go on with, None for a new one.
+    """The manifest of the batch to continue, None for a new one.
 
-    With ``resume`` there may be nothing yet, so that the same command starts and goes on.
+    With ``resume`` there may be no results yet, so that the same command starts and continues.
     """
     if not (manner.resume or manner.retry_errors):
         return None
@@ -117,7 +164,7 @@ def recorded_outputs(recorded: Mapping[str, Any] | None) -> list[str]:
 
 
 def recorded_settings(recorded: Mapping[str, Any] | None) -> dict[str, Any]:
-    """The settings of a recorded plan; what is not given again stays as it was."""
+    """The settings of a recorded plan; settings that are not given again are kept."""
     if recorded is None:
         return {}
     try:

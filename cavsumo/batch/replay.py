@@ -1,4 +1,4 @@
-"""Recorded episodes: found in results or alone in a trace, played again, compared bit for bit."""
+"""Recorded episodes: read from results or a trace, played again, compared bit for bit."""
 
 from __future__ import annotations
 
@@ -27,16 +27,16 @@ from cavsumo.results.traces import NOT_REPLAYED, Trace, parsed, read_trace
 
 @dataclass(frozen=True)
 class Record:
-    """An episode as it was recorded.
+    """A recorded episode.
 
     Attributes:
         plan: of its batch.
         row: the episode's row, as text.
         trace: its trace, None when none was kept.
         origin: the batch's manifest, or the trace's head: versions and checksums.
-        file: where it was found.
+        file: the file that contains it.
         alone: whether that is a trace, without the episodes before it.
-        allowed: the egos and assertions from outside that it may use; None for all (``trust``).
+        allowed: the external egos and assertions that it may use; None for all (``trust``).
     """
 
     plan: BatchPlan
@@ -54,21 +54,21 @@ class Record:
 
     @property
     def command(self) -> str:
-        """What plays it again."""
+        """The command that replays it."""
         return f"cavsumo replay {shlex.quote(self.file.name)}" + (
             "" if self.alone else f" {self.run}"
         )
 
 
 class Replayed(NamedTuple):
-    """An episode that was played again: its row, and its trace, None when an error left none."""
+    """An episode that was played again: its row, and its trace, None after an error."""
 
     row: Row
     trace: Trace | None
 
 
 class Difference(NamedTuple):
-    """Where a replay first departs from the record; see ``DivergenceError``."""
+    """The first difference of a replay from the record; see ``DivergenceError``."""
 
     place: str
     what: str
@@ -138,11 +138,10 @@ def recorded_alone(
 
 
 def located(record: Record, net: Path | None, routes: Path | None) -> Record:
-    """The record with its files where they are here, known by their checksums.
+    """The record with the present paths of its files, identified by their checksums.
 
-    Each is looked for where it is said to be, else where it was recorded and beside the trace; a
-    network that has a name is found by it.
-    Raises InputError when it is nowhere, or another one.
+    Each is searched at the given path, else at its recorded path and beside the trace; a network
+    with a name is found by it. Raises InputError for a missing or different file.
     """
     scenario = record.plan.scenario
     if net is not None:
@@ -164,12 +163,12 @@ def located(record: Record, net: Path | None, routes: Path | None) -> Record:
 
 
 def _files(scenario: Scenario) -> list[Path]:
-    """The files that are looked for."""
+    """The files to find."""
     return [f for f in (scenario.net, scenario.routes, *scenario.additional) if f is not None]
 
 
 def _file(record: Record, option: str, was: Path, given: Path | None) -> Path:
-    """Where a file of a plan is."""
+    """The present path of a plan's file."""
     expected = dict(record.origin.get("sha256") or {}).get(str(was))
     recorded_at = network_file(was) if option == "--net" else routes_file(was)
     if given is None and recorded_at.is_file() and checksum(recorded_at) == expected:
@@ -200,23 +199,23 @@ def _file(record: Record, option: str, was: Path, given: Path | None) -> Path:
 
 
 def prepared_again(record: Record) -> PreparedBatch:
-    """What plays a record; raises InputError when that would use what only its file names."""
+    """The prepared batch of a record; raises InputError for names that need ``--trust``."""
     check_trust(record.plan.scenario, record.file, record.allowed)
     return prepare(record.plan)
 
 
 def replayed(worker: Worker, record: Record) -> Replayed:
-    """An episode once more, with all that came before it and matters to it.
+    """An episode once more, after the earlier episodes on which it depends.
 
-    Learners first live through their earlier episodes, or are told what they knew if a trace
-    stands alone; an episode of a shared simulation comes after those before it.
+    Learners first play their earlier episodes, or get their knowledge from the trace if it stands
+    alone; an episode of a shared simulation comes after those before it.
     """
     outcome = _played_again(worker, record).outcome
     return Replayed(outcome.row, parsed(outcome.trace) if outcome.trace else None)
 
 
 def _played_again(worker: Worker, record: Record) -> Answer:
-    """What its worker answers."""
+    """The answer of its worker."""
     plan, run = worker.prepared.plan, record.run
     if record.alone and record.trace is not None:
         row, memory = record.row, record.trace.head["memory"]
@@ -229,7 +228,7 @@ def _played_again(worker: Worker, record: Record) -> Answer:
 
 
 def known(worker: Worker, run: int) -> Memory | None:
-    """What the agents of an episode knew before it; a learner lives through its earlier ones."""
+    """The knowledge of an episode's agents before it; a learner plays its earlier ones."""
     plan, memory = worker.prepared.plan, job(worker.prepared.plan, run).memory
     step = len(plan.agents)
     learns = job(plan, run).agent in worker.prepared.cast.learners
@@ -265,7 +264,7 @@ def first_difference(
     frames_again: Sequence[Mapping[str, Any]],
     apart: Collection[str] = (),
 ) -> Difference | None:
-    """Where a replay departs from the record: the timestep, the body and the quantity."""
+    """The first difference of a replay from its record: the timestep, the body and the quantity."""
     if frames is not None:
         for old, new in zip(frames, frames_again, strict=False):
             for difference in _frame_differences(old, new):

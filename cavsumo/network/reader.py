@@ -1,4 +1,4 @@
-"""What a SUMO network offers a test: lanes, pavements, crossings, carriageway.
+"""A SUMO network: lanes, pavements, crossings, carriageway.
 
 Read with sumolib; ids are opaque and never parsed, lane 0 is not assumed to be for driving, and
 no side of the road is taken for granted.
@@ -32,7 +32,7 @@ class Network:
     """A network file, read once.
 
     Attributes:
-        file: where it came from.
+        file: the path.
         net: the sumolib network.
         root: the attributes of its <net>.
         edges: its normal edges, in the order of their ids.
@@ -106,7 +106,7 @@ class Network:
     def ground(self, line: LineString, reach_m: float) -> shapely.Geometry:
         """All lanes, crossings and walking areas, as one surface, within a distance of a line [m].
 
-        Lanes without a surface are left out: nobody can walk on them.
+        Lanes without a surface are left out, since no body can be on them.
         """
         insides = [e for kind in ("internal", "crossing") for e in self.inside(kind)]
         lanes = [
@@ -136,9 +136,9 @@ class Network:
 
 
 def read_network(file: FilePath, *, foes: bool = False) -> Network:
-    """Read a .net.xml or .net.xml.gz; raises NetworkError in one sentence when it is none.
+    """Read a .net.xml or .net.xml.gz; raises NetworkError in one sentence for any other file.
 
-    ``foes``: with the tables of who gives way to whom, which take long on large networks.
+    ``foes``: with the tables of right of way, which take long on large networks.
     """
     if file.is_dir():
         raise NetworkError(f"network {str(file)!r}: is a folder, expected a .net.xml")
@@ -254,7 +254,7 @@ def _root(file: FilePath) -> dict[str, str]:
 
 
 def _neighbours(file: FilePath) -> str:
-    """Names the networks that lie where the missing one was looked for."""
+    """The names of the networks in the folder of the missing one."""
     if not file.parent.is_dir():
         return ""
     found = sorted(p.name for p in file.parent.glob("*.net.xml*"))

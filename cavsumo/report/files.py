@@ -1,4 +1,4 @@
-"""A report in files, by their formats; everything is computed before anything is written."""
+"""A report in files, by their formats; all figures are computed before a file is written."""
 
 from __future__ import annotations
 
@@ -14,13 +14,13 @@ from cavsumo.report.junit import junit
 
 @dataclass(frozen=True)
 class ReportOptions:
-    """What a report is asked for.
+    """The options of a report.
 
     Attributes:
-        by: the column whose values are told apart.
-        format: of what is printed, or written to output.
+        by: the column whose values are reported separately.
+        format: of the text that is printed or written to output.
         output, junit, html: files to write.
-        replays: how many failures the page shows as pages of their own.
+        replays: number of failures with pages of their own.
     """
 
     by: str = "agent"

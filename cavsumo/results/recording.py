@@ -24,7 +24,7 @@ ATTRIBUTE = re.compile(r"[A-Za-z]\w*")  # names of a vehicle type's attributes
 
 
 class _Parts(BaseModel):
-    """What a head and frames hold, as JSON."""
+    """Content of a head and frames, as JSON."""
 
     model_config = ConfigDict(strict=True, allow_inf_nan=False, extra="forbid", frozen=True)
 
@@ -36,7 +36,7 @@ class _Parts(BaseModel):
 
 
 def recording_head(played: Recorded) -> dict[str, Any]:
-    """What a trace's head holds of it; the actions are in the frames."""
+    """Entries of a trace's head; the actions are in the frames."""
     there = played.departures
     return {
         "approaches": played.approaches,

@@ -1,4 +1,4 @@
-"""Traces: what happened in an episode, and all that is needed to play it again elsewhere.
+"""Traces: the record of an episode, with all data for playing it again on another machine.
 
 JSON lines. The first is the head: the row, the plan, what the agents knew before, the checksums of
 the files, the versions, the boxes of all bodies, where the testers started, and who of the
@@ -51,7 +51,7 @@ class Shape(NamedTuple):
 
 @dataclass(frozen=True)
 class Trace:
-    """An episode as it was recorded.
+    """A recorded episode.
 
     Attributes:
         head: all but the frames, see ``trace_head``.
@@ -67,12 +67,12 @@ class Trace:
         return bool(self.head["format"] != FORMATS[0])
 
     def recording(self) -> Recorded:
-        """What it takes to play the episode back; raises ResultsError where that is damaged."""
+        """The data for playing the episode back; raises ResultsError where they are damaged."""
         return recording(self.head, self.frames)
 
     @property
     def row(self) -> dict[str, str]:
-        """The row of the episode as text, without what no replay reproduces."""
+        """The row of the episode as text, without the columns that a replay does not reproduce."""
         return dict(self.head["row"])
 
     def shapes(self) -> dict[str, Shape]:
@@ -83,7 +83,7 @@ class Trace:
 
 
 def origin(plan: BatchPlan, site: Site, inputs: Mapping[str, str]) -> dict[str, Any]:
-    """What the episodes of a plan have in common, for the heads of their traces.
+    """The common part of the heads of a plan's traces.
 
     ``inputs``: the checksums of its files.
     """
@@ -122,7 +122,7 @@ def trace_head(
 
 
 def _bodies(snapshots: Iterable[Snapshot]) -> list[dict[str, Any]]:
-    """Everybody in the order of appearance, those with the same box together."""
+    """All bodies in the order of appearance, those with the same box together."""
     met: dict[str, Body] = {}
     for snapshot in snapshots:
         for body in (snapshot.ego.body, *(t.body for t in snapshot.testers)):
@@ -158,7 +158,7 @@ def _pose(state: BodyState) -> list[float]:
 
 
 def states(frame: Mapping[str, Any]) -> Iterator[tuple[str, str, list[float]]]:
-    """Everybody in a frame: part (ego, tester or background), id and [x, y, v, o]."""
+    """All bodies in a frame: part (ego, tester or background), id and [x, y, v, o]."""
     yield "ego", "ego", frame["ego"]
     for part, key in (("tester", "testers"), ("background", "background")):
         for name, state in frame[key].items():
@@ -187,7 +187,7 @@ class UnknownFormat(ValueError):
 
 
 def parsed(text: str) -> Trace:
-    """The trace that a text holds; raises ValueError and the like when it holds none."""
+    """The trace in a text; raises ValueError and the like for invalid text."""
     first, *lines = text.splitlines() or [""]
     head = _head(first)
     keys = FRAME_KEYS if head["format"] == FORMATS[0] else FRAME_KEYS | {"actions"}
@@ -206,9 +206,9 @@ def _head(line: str) -> dict[str, Any]:
 
 
 def read_moments(file: Path, times: Sequence[float]) -> list[tuple[float, dict[str, Any]]]:
-    """For each time [s] the nearest frame of a trace, and how far the ego has driven by then [m].
+    """For each time [s] the nearest frame of a trace, and the ego's distance driven by then [m].
 
-    Only those frames are parsed as a whole: traces are long, and a report reads thousands.
+    Only those frames are parsed completely, because traces are long and a report reads thousands.
     """
     try:
         with file.open(encoding="utf-8") as stream:

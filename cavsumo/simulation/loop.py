@@ -1,6 +1,6 @@
 """Algorithm 1 of the seed: agents, ego and world, one timestep after another.
 
-The truth about the testers' bodies is integrated here by the kinematics; the world is told.
+The testers' states are integrated here by the kinematics and sent to the world.
 """
 
 from __future__ import annotations
@@ -39,13 +39,13 @@ from cavsumo.simulation.setup import Setup
 OVERTIME_S = 15.0
 
 
-# What all agents chose at one timestep: for each its bodies' actions.
+# The actions of all agents at one timestep: for each agent those of its bodies.
 Joint = Sequence[Sequence[Action]]
 
 
 @dataclass
 class Episode:
-    """What happened, while and after it happens.
+    """The record of an episode, during and after it.
 
     Frames and actions only where they are kept; ``drives``: whether the ego steers itself;
     ``forecast``: what the testers said of it beforehand; ``starts``: where they started, and
@@ -82,12 +82,12 @@ class Episode:
 
     @property
     def outcome(self) -> str:
-        """What came out: the verdict, unless a tester broke the rules of the world before it."""
+        """The outcome: the verdict, unless a tester broke the rules of the world before it."""
         return INVALID if self.invalid else self.judgement.verdict
 
 
 class EpisodeLoop:
-    """One episode under way (Algorithm 1).
+    """One running episode (Algorithm 1).
 
     Args:
         agents: one for each team, kept from episode to episode, so that learners learn.
@@ -98,9 +98,9 @@ class EpisodeLoop:
         demand: departures of the background that were recorded, in place of the scenario's demand.
 
     Attributes:
-        scene: what does not change during the episode.
-        snapshot: the truth now.
-        ego_view, agent_views: what the ego and each agent see of it.
+        scene: the constant part of the episode.
+        snapshot: the true state now.
+        ego_view, agent_views: the views of the ego and of each agent.
         over: whether it has ended.
     """
 
@@ -123,16 +123,16 @@ class EpisodeLoop:
         self._episode = Episode(Judgement(""), starts=begun.starts, waited=begun.waited)
         self._episode.forecast = _foretold(agents, self.agent_views)
         self._validity = ValidityMonitor(self.scene)
-        self._history: list[Snapshot] = []  # what blame and progress are found from
+        self._history: list[Snapshot] = []  # from which blame and progress are found
         self._arrived = False
         self._learners = any(type(a).process_feedback is not Agent.process_feedback for a in agents)
         self._observe(self.snapshot)
         self._end(_over(setup, self.snapshot))
 
     def step(self) -> Feedback | None:
-        """One timestep: everybody chooses, the world moves on; what the agents earned by it.
+        """One timestep: all choose, the world moves on; returns the agents' rewards.
 
-        None once their game is over, although the episode may go on until all is decided.
+        None once their game is over, although the episode may continue until all assertions decide.
         """
         setup, episode, snapshot, agents = self._setup, self._episode, self.snapshot, self._agents
         scene, views = self.scene, self.agent_views
@@ -164,21 +164,21 @@ class EpisodeLoop:
 
     @property
     def contacts(self) -> ContactMonitor:
-        """Who touched whom so far."""
+        """The contacts so far."""
         return self._episode.contacts
 
     @property
     def judgement(self) -> Judgement:
-        """The most serious of what the assertions say so far."""
+        """The most serious judgement of the assertions so far."""
         return weightiest(self._setup.assertions)
 
     @property
     def outcome(self) -> str:
-        """What came out so far."""
+        """The outcome so far."""
         return INVALID if self._validity.spoils(self.judgement) else self.judgement.verdict
 
     def finished(self) -> Episode:
-        """What happened, or what happened so far."""
+        """The record of the episode, possibly so far."""
         episode = _finished(self._setup, self._episode, self.snapshot, self._rewards)
         episode.rms_acceleration = episode.naturalness.rms_acceleration(
             episode.steps, self.scene.dt
@@ -195,7 +195,7 @@ class EpisodeLoop:
     def _observe(self, snapshot: Snapshot) -> None:
         """Show a snapshot to the monitors and the assertions.
 
-        The testers are watched until an assertion is violated: what follows changes no verdict.
+        The testers are checked until an assertion is violated: later breaches change no verdict.
         """
         episode, assertions = self._episode, self._setup.assertions
         contacts = episode.contacts.observe(snapshot)
@@ -218,7 +218,7 @@ class EpisodeLoop:
                 assertion.conclude()
 
     def _show(self, snapshot: Snapshot) -> None:
-        """Let everybody see a snapshot: all of it, unless there are sensors."""
+        """Make the views of a snapshot: the whole snapshot, unless there are sensors."""
         if self._senses is None:
             self.ego_view, self.agent_views = snapshot, (snapshot,) * len(self._agents)
         else:
@@ -255,7 +255,7 @@ def _reset(
     scenario = setup.scenario
     placing = starts_generator(seed if scenario.starts_seed is None else scenario.starts_seed)
     watching: list[Ego | Agent | Assertion] = [setup.ego, *agents, *setup.assertions]
-    # Vehicles keep their distance to whoever is ahead of them, so they see everybody.
+    # Vehicles keep their distance to all bodies ahead of them, so they see everybody.
     sensors = bool(scenario.ego_sensor or scenario.tester_sensor)
     everything = record or bool(setup.site.approaches) or sensors
     everything = everything or any(who.sees_background for who in watching)
@@ -281,7 +281,7 @@ def _reset(
 
 
 def _foretold(agents: Sequence[Agent], views: Sequence[Snapshot]) -> Forecast | None:
-    """What the agents say of the episode before it: the best that one of them says."""
+    """The agents' forecast of the episode: the best of theirs."""
     said = [agent.forecast(view) for agent, view in zip(agents, views, strict=True)]
     return max((one for one in said if one is not None), default=None, key=Forecast.rank)
 
@@ -306,8 +306,8 @@ def _moved(
 ) -> tuple[BodyState, ...]:
     """The testers' next states by the kinematics (seed, eqs 8 to 19).
 
-    A body that stands keeps its very record, and if all do, so does their tuple: by that others
-    know, without a look at the numbers, that nothing has changed.
+    A body that stands keeps the same record object, and if all do, so does their tuple: identity
+    then tells, without comparing numbers, that nothing has changed.
     """
     moved: list[BodyState] = []
     for team, joint in zip(teams, actions, strict=True):
@@ -364,7 +364,7 @@ def _over(setup: Setup, snapshot: Snapshot) -> bool:
 
 
 def _at_end(scene: Scene, snapshot: Snapshot) -> bool:
-    """Whether a freely driving ego has come to the end of its path."""
+    """Whether a freely driving ego has reached the end of its path."""
     ego, path = snapshot.ego, scene.ego_path
     return path.project(ego.x, ego.y).along >= path.length - ego.body.kind.length / 2
 

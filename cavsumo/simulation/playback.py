@@ -1,6 +1,6 @@
 """Playing back: an episode once more from its record, with any ego and any assertions.
 
-The one way for whoever needs it: reruns with a reference driver, replays, certificates (whose plan
+One way for all uses: reruns with a reference driver, replays, certificates (whose plan
 holds the record as what its agents know).
 """
 

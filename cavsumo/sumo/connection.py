@@ -1,6 +1,6 @@
-"""SUMO's simulation: one for each episode, or one that serves several, begun again and again.
+"""SUMO's simulation: one for each episode, or one for several episodes.
 
-Speaks to SUMO through the functions it is given, so that ``world`` stays the one boundary.
+It calls SUMO through given functions, so that ``world`` stays the one boundary.
 """
 
 from __future__ import annotations
@@ -77,7 +77,7 @@ class Simulations:
         self._sumo.simulationStep()
 
     def set_light(self) -> None:
-        """Have the first traffic light on the ego's route show what was asked for."""
+        """Set the first traffic light on the ego's route to its required phase."""
         start, lights = self._site.light, self._sumo.trafficlight
         if start is None:
             return

@@ -1,9 +1,9 @@
-"""The background traffic of a scenario, noted once and sent again into a simulation that goes on.
+"""The background traffic of a scenario, recorded once and sent again into a running simulation.
 
-SUMO reads a route file along its own clock, so a simulation that serves many episodes cannot use
-it. Instead the demand is played once without ego and testers: who departs when, where, how fast,
-on which route. Each episode then gets these departures again, counted from its own beginning. What
-SUMO draws by itself (speed factors, dawdling) is drawn anew.
+SUMO reads a route file along its own clock, so a simulation for many episodes cannot use it.
+Instead the demand is played once without ego and testers, and all departures are recorded with
+time, place, speed and route. Each episode then gets these departures again, counted from its own
+beginning. SUMO's own random numbers (speed factors, dawdling) are drawn anew.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from cavsumo.model.departures import Attributes, Demand, Stage, Trip, Walk
 BEYOND_S = 60.0  # how far beyond the horizon there must be demand, for waits and overtime
 WALKING = 2  # SUMO's number of the stage in which a person walks
 WAITING = 1  # and in which one waits
-# What a route file may hold besides departures.
+# Elements of a route file besides departures.
 LASTING = ("vType", "vTypeDistribution", "route", "routeDistribution")
 
 
@@ -42,7 +42,7 @@ def noted(sumo: Any, duration: float) -> Demand:
 
 
 class DepartureNotes:
-    """Who departed so far in a simulation.
+    """Departures so far in a simulation.
 
     Args:
         types: of the demand.
@@ -85,7 +85,7 @@ def _trip(vehicle: Any, now: float, name: str) -> Trip:
 
 
 def _walk(person: Any, now: float, name: str) -> Walk:
-    """A person who has just departed; raises InputError for one who does not just walk or wait."""
+    """A person that has just departed; raises InputError unless it only walks and waits."""
     stages = [person.getStage(name, i) for i in range(person.getRemainingStages(name))]
     for stage in stages:
         if stage.type not in (WALKING, WAITING):
@@ -105,7 +105,7 @@ def _walk(person: Any, now: float, name: str) -> Walk:
 
 
 class Departures:
-    """A demand being sent again, each body when its time has come.
+    """A demand that is sent again, each body at its time.
 
     Args:
         sumo: SUMO's functions, of a simulation that was started without the demand.
@@ -126,7 +126,7 @@ class Departures:
         self._next_walk = next(self._walks, None)
 
     def send(self) -> None:
-        """Let go who departs in the timestep that comes next; call before each."""
+        """Send the departures of the next timestep; call before each."""
         now = self._steps * self._dt + 1e-6
         self._steps += 1
         while self._next_trip is not None and self._next_trip.time <= now:
@@ -176,7 +176,7 @@ class Lights:
         ]
 
     def restore(self) -> None:
-        """Put them back; static programs then run as they did."""
+        """Restore them; static programs then run as they did."""
         for name, phase, left in self._first:
             self._lights.setPhase(name, phase)
             self._lights.setPhaseDuration(name, left)

@@ -2,7 +2,7 @@
 
 Each body is written for itself: its exact place, speed and speed factor at the exact time. SUMO's
 drivers and walkers draw their later random numbers from generators of the lanes that they are on,
-so the same bodies in the same places draw the same numbers, whatever demand they came from.
+so the same bodies in the same places draw the same numbers, from any demand.
 
 Departures do not tell all that a route file may ask for (stops, rides, where a trip ends on its
 last edge, ...). Of a demand that holds more than is listed here none are recorded.

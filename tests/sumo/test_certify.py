@@ -383,7 +383,7 @@ def test_a_certificate_is_the_least_of_its_egos(tmp_path: Path) -> None:
     assert found.violated == lower_bound(2, 100, 0.975)
     assert as_json(found)["egos"][1]["errors"] == 5
     assert not any(one.alike for one in found.guarantees)
-    assert "whichever of these 2 egos drives" in sentences(found)[0]
+    assert "against each of these 2 egos" in sentences(found)[0]
 
 
 @pytest.mark.parametrize(

@@ -1,6 +1,6 @@
-"""Temporal-logic formulas over named signals: their text, their meaning, what they speak of.
+"""Temporal-logic formulas over named signals: syntax, semantics, signals.
 
-Nothing in here knows of assertions; ``assertions.formula`` watches episodes by them.
+Independent of assertions; ``assertions.formula`` evaluates them on episodes.
 """
 
 from cavsumo.assertions.formulas.rules import Rule, rule

@@ -1,8 +1,8 @@
-"""What is certified: a test as a policy of the testers, taken from results or named.
+"""The certified test: a policy of the testers, taken from results or named.
 
-A run gives the policy that its agent followed then: its parameters and what it knew before that
-episode, and (unless starts are to be fresh) where its testers started. Everything else is chance
-and drawn anew: SUMO's, the agents' own, the sensors'.
+A run gives the policy that its agent followed then: its parameters, its knowledge before that
+episode and, unless starts are drawn anew, the starts of its testers. All random numbers are drawn
+anew: SUMO's, the agents' and the sensors'.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ from cavsumo.model.scenario import BatchPlan, Params
 from cavsumo.results.provenance import EXTENT
 from cavsumo.results.traces import Trace
 
-# Settings of results that are not the test's: which agents, against whom, how often, how kept.
+# Settings of results that do not belong to the test: agents, egos, numbers of runs, storage.
 OTHERS = EXTENT - {"deadline_s"} | {
     *("agents", "params", "known", "seed", "shard", "reset", "trace", "reference"),
     *("ego", "ego_params", "starts_seed"),
@@ -39,10 +39,10 @@ class Subject:
     """A test to certify.
 
     Attributes:
-        words: what it is, for people.
-        agent: who plays it, as a plan names agents.
+        words: its description.
+        agent: the agent that plays it, as a plan names agents.
         params: the agent's parameters.
-        known: what it knows at the beginning of every episode, by label.
+        known: its knowledge at the beginning of every episode, by label.
         starts_seed: the seed of the episode whose starts it keeps; None to draw them anew.
         starts: those starts, x, y and o of each tester's body, where they were recorded.
         told: the starts that the agent knows and that are not drawn; empty for none.
@@ -64,8 +64,8 @@ def of_run(record: Record, params: Params, *, kept: bool, open_loop: bool) -> Su
 
     Args:
         params: parameters of the agent in place of its own.
-        kept: its testers start where they did.
-        open_loop: they do what they did, whatever happens, instead of what their agent would do.
+        kept: its testers keep their recorded starts.
+        open_loop: they repeat their recorded actions instead of those of their agent.
     """
     plan, label = record.plan, record.row["agent"]
     if label not in plan.cast:
@@ -88,7 +88,7 @@ def of_run(record: Record, params: Params, *, kept: bool, open_loop: bool) -> Su
 def of_policy(
     word: str, plan: BatchPlan, manifest: Mapping[str, Any], file: Path, params: Params
 ) -> Subject:
-    """An agent by the label that it has in results, or one that stands by itself."""
+    """An agent by its label in results, or any other agent."""
     if word in plan.cast:
         learned = manifest.get("learned", {}).get(word) or (plan.known or {}).get(word)
         memory = {} if learned is None else {word: tuple(learned)}
@@ -110,7 +110,7 @@ def settings_of(
 ) -> dict[str, Any]:
     """The settings of a batch that plays a test in the scenario of results; all but the ego.
 
-    Background traffic that is drawn is the scenario's, so it stays what it was.
+    Drawn background traffic belongs to the scenario, so it is kept.
     """
     settings = {k: v for k, v in recorded_settings(manifest).items() if k not in OTHERS} | {
         "agents": [subject.agent],
@@ -137,21 +137,21 @@ def starts_seed(record: Record) -> int:
 
 
 def _starts(record: Record) -> list[tuple[float, float, float]] | None:
-    """Where the testers of an episode started, if a trace tells."""
+    """The starts of an episode's testers, if there is a trace."""
     if record.trace is None:
         return None
     return [(x, y, o) for x, y, _, o in record.trace.frames[0]["testers"].values()]
 
 
 def _word(plan: BatchPlan, label: str) -> str:
-    """An agent as its plan names it."""
+    """An agent by its name in the plan."""
     return label if plan.cast[label] == label else f"{label}={plan.cast[label]}"
 
 
 def _known_before(record: Record) -> Memory | None:
-    """What an agent knew before an episode: from its trace, or by living through its earlier ones.
+    """The knowledge of an agent before an episode: from its trace, or by playing its earlier ones.
 
-    Plain agents know nothing.
+    Agents that do not learn have none.
     """
     plan, label = record.plan, record.row["agent"]
     if label not in resolve_cast(plan).learners:

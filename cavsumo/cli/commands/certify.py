@@ -1,4 +1,4 @@
-"""``cavsumo certify``: a test over fresh seeds and a list of egos, and what that proves."""
+"""``cavsumo certify``: a test on fresh seeds against a list of egos, with proven bounds."""
 
 from __future__ import annotations
 
@@ -47,17 +47,17 @@ WIDTH = 120
 
 @dataclass(frozen=True)
 class CertifyOptions:
-    """What to certify, against whom, and how to show it.
+    """Options of the command.
 
     Attributes:
-        results, test: where the test comes from; a run's number or an agent.
-        starts: "kept" or "fresh"; None for what is usual.
+        results, test: the source of the test; a run's number or an agent.
+        starts: "kept" or "fresh"; None for the default.
         open_loop: the run's recorded actions instead of its agent.
         param: parameters of the agent in place of its own.
-        egos: as a command line names them.
+        egos: as on the command line.
         ego_param: their parameters, ``LABEL.KEY``.
-        trust: use egos and assertions from outside that only the results name.
-        runs, seed: episodes an ego, and where their seeds come from.
+        trust: use external egos and assertions that only the results name.
+        runs, seed: episodes per ego, and the seed from which theirs are drawn.
         apart: other results whose seeds are not to be used.
         confidence: of the bounds for all egos together.
         jobs: episodes at a time.
@@ -88,7 +88,7 @@ class CertifyOptions:
 
 
 def certify(order: CertifyOptions) -> int:
-    """Play the test and say what holds; everything is checked before anything is written."""
+    """Play the test and print the bounds; all checks precede the first written file."""
     _check(order)
     means = Means(order.jobs)
     plan, manifest = recorded_plan(order.results)
@@ -123,7 +123,7 @@ def certify(order: CertifyOptions) -> int:
 
 
 def _check(order: CertifyOptions) -> None:
-    """Refuse what can be seen to be wrong at once."""
+    """Refuse wrong options."""
     if not 0.0 < order.confidence < 1.0:
         raise InputError(f"--confidence: expected a share below 1, got {order.confidence:g}")
     if order.runs < 1:
@@ -142,7 +142,7 @@ def _check(order: CertifyOptions) -> None:
 def _check_batches(
     order: CertifyOptions, batches: Sequence[CheckedBatch], subject: Subject, record: Record | None
 ) -> None:
-    """Refuse to write over what is read, and starts that another ego would change."""
+    """Refuse to overwrite the results that are read, and starts that another ego would change."""
     read = {file.resolve() for file in (order.results, *order.apart)}
     for batch in batches:
         if batch.output.resolve() in read:
@@ -164,7 +164,7 @@ def _check_batches(
 
 
 def _drawn(prepared: PreparedBatch, seed: int) -> list[tuple[float, float, float]]:
-    """Where testers start in a prepared batch."""
+    """The starts of testers in a prepared batch."""
     scenario = prepared.plan.scenario
     ego = make_ego(scenario.ego, scenario.ego_params).kind
     kinds = [kind_named(scenario.kind)] * scenario.testers
@@ -172,18 +172,18 @@ def _drawn(prepared: PreparedBatch, seed: int) -> list[tuple[float, float, float
     return [(start.x, start.y, start.o) for start in starts]
 
 
-# What is played
+# The batches
 
 
 def _allowed(order: CertifyOptions) -> frozenset[str] | None:
-    """The egos that the user named, None for whatever the results name."""
+    """The egos that the user named; None to allow those of the results."""
     return None if order.trust else frozenset(cast_of(order.egos).values())
 
 
 def _subject(
     order: CertifyOptions, plan: BatchPlan, manifest: Mapping[str, Any]
 ) -> tuple[Subject, Record | None]:
-    """The test, and the run that it comes from if it does."""
+    """The test, and its run if it has one."""
     if not order.test.isdecimal():
         return of_policy(order.test, plan, manifest, order.results, order.param), None
     record = recorded(order.results, int(order.test), _allowed(order))
@@ -209,7 +209,7 @@ def _marked(batch: CheckedBatch, order: CertifyOptions, subject: Subject) -> Che
 
 @contextlib.contextmanager
 def _output(order: CertifyOptions) -> Iterator[Path]:
-    """Where the results go; without a name for them to where they are soon gone."""
+    """The results file; in a temporary folder without ``-o``."""
     if order.output is not None:
         yield order.output
         return
@@ -227,7 +227,7 @@ def _warn(
     seeds: Used,
     subject: Subject,
 ) -> None:
-    """Say on stderr what a reader of the certificate should know."""
+    """Print warnings about the certificate on stderr."""
     for part, now in (("versions", prepared.versions), ("sha256", prepared.checksums)):
         was = manifest.get(part) or {}
         for name in sorted(was.keys() & now.keys()):
@@ -244,7 +244,7 @@ def _warn(
 
 
 def _first_lines(order: CertifyOptions, subject: Subject, seeds: Used, seed: int) -> str:
-    """What is certified, what is kept and what is drawn."""
+    """The first lines: the test, and the kept and drawn parts."""
     starts = "kept" if subject.starts_seed is not None else "drawn anew"
     files = ", ".join(map(str, seeds.results))
     return (

@@ -38,13 +38,13 @@ SUFFIXES = (".png", ".svg", ".pdf")
 
 @dataclasses.dataclass(frozen=True)
 class SolveOptions:
-    """What to solve, and how to show it.
+    """Options of the command.
 
     Attributes:
         file: the game.
         reading: A, B or C.
-        precision: how far the bounds may be apart.
-        trim: solve what can be solved.
+        precision: largest distance of the bounds.
+        trim: solve the solvable part.
         as_json: as JSON instead of a table.
         picture: file to draw the game's tree into.
         policy_picture: file to draw the policy into.
@@ -64,7 +64,7 @@ class SolveOptions:
 
 
 def solve_file(order: SolveOptions) -> int:
-    """Solve the game in a file and say what was found."""
+    """Solve the game in a file and print the solution."""
     if not (math.isfinite(order.precision) and order.precision > 0):
         raise InputError(f"--precision: expected a positive number, got {order.precision:g}")
     if order.time_limit is not None and not order.time_limit > 0:
@@ -97,7 +97,7 @@ def solve_file(order: SolveOptions) -> int:
 
 @contextmanager
 def _stdout_kept() -> Iterator[None]:
-    """Send to stderr what compiled libraries print: stdout has the result and nothing else."""
+    """Send the output of compiled libraries to stderr: stdout has only the result."""
     sys.stdout.flush()
     kept = os.dup(1)
     os.dup2(2, 1)
@@ -109,7 +109,7 @@ def _stdout_kept() -> Iterator[None]:
 
 
 def _status(order: SolveOptions, verdict: Solvability, solution: Solution | None) -> int:
-    """The exit status; says on stderr when the bounds are wider than asked for."""
+    """The exit status, with a note on stderr when the bounds are wider than the precision."""
     if solution is not None and not solution.precise:
         print(
             f"cavsumo: the bounds are {solution.width:.3g} apart, not {order.precision:g}: floats "
@@ -121,7 +121,7 @@ def _status(order: SolveOptions, verdict: Solvability, solution: Solution | None
 
 
 def _painters(order: SolveOptions) -> list[tuple[Any, Path]]:
-    """The functions that draw, with their files; InputError where that cannot be."""
+    """The functions that draw, with their files; InputError if that is impossible."""
     wanted = [("--picture", order.picture, "draw_tree")]
     wanted += [("--policy-picture", order.policy_picture, "draw_policy")]
     found = []
@@ -146,7 +146,7 @@ def _painters(order: SolveOptions) -> list[tuple[Any, Path]]:
 
 @contextmanager
 def _progress(quiet: bool) -> Iterator[Tell]:
-    """What is being done, on stderr: live on a terminal, now and then a line elsewhere."""
+    """The current step, on stderr: live on a terminal, a line at intervals elsewhere."""
     if quiet:
         yield lambda _, __: None
     elif sys.stderr.isatty():
@@ -161,7 +161,7 @@ def _progress(quiet: bool) -> Iterator[Tell]:
 
 @contextmanager
 def _lines() -> Iterator[Tell]:
-    """A line every EVERY_S with the seconds so far, also while one thing takes longer than that."""
+    """A line every EVERY_S with the seconds so far, also during a longer step."""
     begun, over, said = time.monotonic(), threading.Event(), "solving"
 
     def tell(doing: str, left: float) -> None:
@@ -182,7 +182,7 @@ def _lines() -> Iterator[Tell]:
 
 
 def _said(doing: str, left: float) -> str:
-    """What is being done, in words."""
+    """The current step, in words."""
     return f"solving: {doing}" + (f", residual {left:.1e}" if math.isfinite(left) else "")
 
 
@@ -214,7 +214,7 @@ def _json(order: SolveOptions, game: Game, verdict: Solvability, solution: Solut
 
 
 def _witness(verdict: Solvability) -> dict[str, Any] | None:
-    """The states that stand against a solution."""
+    """The states that make the game unsolvable."""
     if verdict.solvable:
         return None
     trap, cycle = verdict.trap, verdict.cycle
@@ -232,9 +232,9 @@ def _number(x: float) -> float | str:
 
 
 def _move(game: Game, solution: Solution, state: int) -> Any:
-    """What the tester plays in a state: an action, in B weights, in C a reply to each action.
+    """The tester's move in a state: an action, in B weights, in C a reply to each action.
 
-    None at goals and where no goal can be forced.
+    None at goals and in states from which no goal can be forced.
     """
     if game.goal[state] or not np.isfinite(solution.lower[state]):
         return None

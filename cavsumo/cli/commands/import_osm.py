@@ -49,17 +49,17 @@ ENDINGS = (".net.xml", ".net.xml.gz")
 
 @dataclass(frozen=True)
 class ImportOptions:
-    """What to import, and how.
+    """Options of the command.
 
     Attributes:
         source: the extract.
         output: the network to write.
-        bbox: west, south, east, north as written, or None for all of it.
-        left_hand: traffic keeps left; None for where the extract lies.
+        bbox: west, south, east, north as written, or None for the whole extract.
+        left_hand: traffic keeps left; None to decide by the extract.
         keep_pedestrian_signals: keep traffic lights that only stop cars for pedestrians.
         zebra: pedestrians have priority on crossings without traffic lights.
         overwrite: replace another network.
-        time_limit_s: how long netconvert may take [s].
+        time_limit_s: time limit of netconvert [s].
     """
 
     source: Path
@@ -73,7 +73,7 @@ class ImportOptions:
 
 
 def import_osm(order: ImportOptions) -> int:
-    """Make the network; nothing is written unless all went well."""
+    """Make the network; files are written only after success."""
     _check(order)
     box = None if order.bbox is None else parse_box(order.bbox)
     roads = find_roads(order.source, box)
@@ -101,7 +101,7 @@ def import_osm(order: ImportOptions) -> int:
 
 
 def _about_side(found: Side, asked: bool | None) -> Iterator[str]:
-    """What to say of the side of the road that was asked for or is taken."""
+    """The note about the side of the road, chosen or derived."""
     if asked is not None or not found.certain:
         about = warning(found, bool(asked))
         if about is not None:
@@ -116,7 +116,7 @@ def _about_side(found: Side, asked: bool | None) -> Iterator[str]:
 
 
 def _check(order: ImportOptions) -> None:
-    """Refuse what cannot become a network file, before any work."""
+    """Refuse a path that cannot become a network file, before any work."""
     output = order.output
     if not output.name.endswith(ENDINGS) or output.name in ENDINGS:
         raise InputError(f"output {str(output)!r}: expected a name that ends in .net.xml")
@@ -129,7 +129,7 @@ def _check(order: ImportOptions) -> None:
 
 
 def _options(order: ImportOptions, box: Box | None) -> list[str]:
-    """netconvert's options, apart from the type maps, whose place differs between machines."""
+    """netconvert's options without the type maps, whose path differs between machines."""
     left_out = {"tls.discard-simple"} if order.keep_pedestrian_signals else set()
     return [
         f"osm-files={EXTRACT}",
@@ -142,7 +142,7 @@ def _options(order: ImportOptions, box: Box | None) -> list[str]:
 
 
 def _zebra(folder: Path, time_limit_s: float) -> list[str]:
-    """Give the crossings without traffic lights priority; what netconvert says to it."""
+    """Give the crossings without traffic lights priority; returns netconvert's output."""
     network = read_network(folder / NET)
     crossings = [
         (
@@ -188,7 +188,7 @@ def _with_notice(network: str, order: ImportOptions, options: list[str]) -> str:
 
 
 def _publish(order: ImportOptions, network: str, log_text: str, log: Path) -> None:
-    """Put the network and its log in place, each as a whole."""
+    """Write the network and its log, each atomically."""
     data = network.encode("utf-8")
     if order.output.suffix == ".gz":
         data = gzip.compress(data, mtime=0)
@@ -205,7 +205,7 @@ def _publish(order: ImportOptions, network: str, log_text: str, log: Path) -> No
 
 
 def _write(file: Path, data: bytes) -> None:
-    """Replace a file as a whole: a reader sees the old one or the new one."""
+    """Replace a file atomically: a reader sees the old one or the new one."""
     part = file.with_name(f".{file.name}.part")
     try:
         part.write_bytes(data)
@@ -221,7 +221,7 @@ def _log_file(output: Path) -> Path:
 
 
 def _what_was_made(output: Path, made: Facts) -> str:
-    """One line about the network, and what to do with it."""
+    """One line about the network, and the next commands."""
     name = shlex.quote(str(output))
     side = ", left-hand traffic" if made.left_hand else ""
     lights = f"{made.traffic_lights} traffic light{'' if made.traffic_lights == 1 else 's'}"

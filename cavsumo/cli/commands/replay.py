@@ -31,7 +31,7 @@ TRACE = ".jsonl"  # how the name of a trace ends
 
 @dataclass(frozen=True)
 class ReplayOptions:
-    """What a replay is asked for.
+    """Options of the command.
 
     Attributes:
         run: number of the episode in results; None when a trace is given.
@@ -56,7 +56,7 @@ class ReplayOptions:
 
     @property
     def shown(self) -> bool:
-        """Whether the trace is of any use."""
+        """Whether the trace is needed."""
         return bool(self.html or self.fcd or self.gui)
 
 
@@ -108,7 +108,7 @@ def _located(record: Record, file: Path, wanted: ReplayOptions) -> Record:
 
 
 def _recorded_trace(record: Record) -> Trace:
-    """The trace as it was recorded."""
+    """The recorded trace."""
     if record.trace is None:
         raise InputError(f"--recorded: no trace was kept of run {record.run}; it must be played")
     print(f"run {record.run} ({record.row['agent']}): {record.row['outcome']}, as recorded")
@@ -136,7 +136,7 @@ def _played_back(record: Record) -> Site:
 
 
 def _prepared(record: Record) -> PreparedBatch:
-    """What plays a record; what has changed since is said on stderr."""
+    """The prepared batch of a record; stderr names the changes since it was recorded."""
     prepared = prepared_again(record)
     for change in changes(record.origin, manifest(prepared)):
         print(f"cavsumo: {change}", file=sys.stderr)
@@ -160,7 +160,7 @@ def _as_it_was(record: Record, found: Record) -> Record:
 
 
 def _show(site: Site, record: Record, trace: Trace, wanted: ReplayOptions) -> None:
-    """Write and show what was asked for."""
+    """Write and show the requested output."""
     if wanted.fcd is not None:
         write_fcd(trace, wanted.fcd)
     if wanted.html is not None:

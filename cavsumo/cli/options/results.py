@@ -96,7 +96,7 @@ def add_merge(commands: Any) -> None:
     )
     merge.add_argument("parts", nargs="+", type=Path, metavar="PART", help="the CSV of a shard")
     merge.add_argument("-o", "--output", required=True, type=Path, metavar="FILE")
-    merge.add_argument("--overwrite", action="store_true", help="in place of an unfinished batch")
+    merge.add_argument("--overwrite", action="store_true", help="in place of what is there")
     merge.add_argument("-q", "--quiet", action="store_true", help="no summary")
     merge.set_defaults(command=_merge)
 
