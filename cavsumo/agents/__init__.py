@@ -1,6 +1,6 @@
 """Tester agents: the protocol (``base``), the registry, one file an algorithm.
 
-``casting`` builds the agents of a batch, ``planning`` holds the games that some of them play.
+``casting`` resolves the agents of a batch, ``planning`` holds the games that some of them play.
 Agents see snapshots only: no SUMO, no assertions.
 To add one: a file here, its name in ``names``; it is imported when one is built.
 """

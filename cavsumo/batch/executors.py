@@ -2,42 +2,18 @@
 
 from __future__ import annotations
 
-import importlib.util
 import logging
 from collections.abc import Iterator
 from concurrent.futures import Executor, ThreadPoolExecutor
 from contextlib import contextmanager
-from dataclasses import dataclass
 from typing import Any
 
+from cavsumo.batch.manner import Means
 from cavsumo.batch.worker import close_all
 from cavsumo.errors import InputError
 
 CONNECT_S = 10.0  # how long to look for a scheduler, and for its first worker
 EXECUTORS = ("local", "dask")
-
-
-@dataclass(frozen=True)
-class Means:
-    """How episodes are played, which never changes what comes out.
-
-    Attributes:
-        jobs: how many at a time; None for what the executor has.
-        executor: "local" or "dask".
-        scheduler: address of dask's scheduler.
-    """
-
-    jobs: int | None = None
-    executor: str = "local"
-    scheduler: str | None = None
-
-    def __post_init__(self) -> None:
-        if self.jobs is not None and self.jobs < 1:
-            raise InputError(f"jobs: expected a number of at least 1, got {self.jobs}")
-        if (self.executor == "dask") != (self.scheduler is not None):
-            raise InputError("--executor dask and --scheduler ADDRESS go together")
-        if self.executor == "dask" and importlib.util.find_spec("distributed") is None:
-            raise InputError("--executor dask needs a library: pip install 'cavsumo[dask]'")
 
 
 @contextmanager

@@ -13,10 +13,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from cavsumo.assertions.base import HELD, VIOLATED
-from cavsumo.results.columns import COLUMNS
-
-Row = dict[str, Any]
+from cavsumo.assertions.judgement import HELD, VIOLATED
+from cavsumo.results.columns import COLUMNS, Row
 
 
 @dataclass(frozen=True)
@@ -57,11 +55,6 @@ def row_line(row: Mapping[str, Any]) -> str:
     cells = [cell(row.get(column)) for column in COLUMNS]
     csv.writer(line, lineterminator="\n").writerow(cells)
     return line.getvalue()
-
-
-def verdicts_cell(verdicts: Mapping[str, str]) -> str:
-    """What every assertion said, as it stands in the CSV."""
-    return " ".join(f"{name}={verdict}" for name, verdict in verdicts.items())
 
 
 def verdicts_of(row: Mapping[str, Any]) -> dict[str, str]:

@@ -16,7 +16,7 @@ from cavsumo.agents.base import Agent, Forecast
 from cavsumo.assertions.base import INVALID, VIOLATED, Assertion, Judgement, weightiest
 from cavsumo.assertions.blame import blamed
 from cavsumo.assertions.contacts import ContactMonitor
-from cavsumo.assertions.criticality_monitor import CriticalityMonitor
+from cavsumo.assertions.criticality_monitor import CriticalityMonitor, Extremes
 from cavsumo.assertions.naturalness import Naturalness
 from cavsumo.assertions.validity import Breach, ValidityMonitor
 from cavsumo.egos.base import Drive, Ego
@@ -60,6 +60,7 @@ class Episode:
     blame: str = ""
     rms_acceleration: float = 0.0
     criticality: CriticalityMonitor = field(default_factory=CriticalityMonitor)
+    extremes: Extremes = field(default_factory=Extremes)
     cost: float = 0.0
     reward: float = 0.0
     sumo_collisions: frozenset[tuple[str, str]] = frozenset()
@@ -383,6 +384,7 @@ def _finished(
     episode.judgement = weightiest(setup.assertions)
     episode.verdicts = {a.name: a.judgement.verdict for a in setup.assertions}
     episode.steps, episode.time = snapshot.step, snapshot.time
+    episode.extremes = episode.criticality.extremes()
     episode.cost, episode.reward = rewards.cost, rewards.total
     world = setup.world
     episode.sumo_collisions = frozenset(world.collisions)

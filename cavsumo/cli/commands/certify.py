@@ -25,8 +25,8 @@ from cavsumo.batch.certify.certificate import (
 from cavsumo.batch.certify.ego_list import Egos, choices, opponents
 from cavsumo.batch.certify.tested_policy import Subject, of_policy, of_run, settings_of
 from cavsumo.batch.certify.used_seeds import Used, fresh_seed, used
-from cavsumo.batch.executors import Means
-from cavsumo.batch.preflight import CheckedBatch, Manner, checked
+from cavsumo.batch.manner import Manner, Means
+from cavsumo.batch.preflight import CheckedBatch, checked
 from cavsumo.batch.prepared import PreparedBatch
 from cavsumo.batch.replay import Record, prepared_again, recorded, recorded_plan
 from cavsumo.batch.trust import check_trust

@@ -8,11 +8,13 @@ from concurrent.futures import Executor
 from pathlib import Path
 from typing import Any
 
-from cavsumo.agents.casting import make_agents
 from cavsumo.batch.batch_run import BatchRun
-from cavsumo.batch.executors import Means, opened
+from cavsumo.batch.executors import opened
 from cavsumo.batch.interrupts import Interrupts
-from cavsumo.batch.preflight import CheckedBatch, Manner, checked
+from cavsumo.batch.manner import Manner as Manner
+from cavsumo.batch.manner import Means
+from cavsumo.batch.planned import PlannedBatch, planned
+from cavsumo.batch.preflight import CheckedBatch, prepared_batches
 from cavsumo.batch.prepared import PreparedBatch
 from cavsumo.batch.stopping import looks_at_rows
 from cavsumo.batch.summary import Ended, summarise
@@ -26,12 +28,12 @@ from cavsumo.results.writing import Recorder
 
 def run(settings: Mapping[str, Any], output: Path, means: Means, manner: Manner) -> int:
     """Play a batch; everything is checked before anything is written."""
-    return run_study([Part("", dict(settings))], output, means, manner)
+    return run_study(planned([Part("", dict(settings))], output, manner), means, manner)
 
 
-def run_study(parts: Sequence[Part], output: Path, means: Means, manner: Manner) -> int:
+def run_study(batches: Sequence[PlannedBatch], means: Means, manner: Manner) -> int:
     """Play one batch after another; all are checked before anything is written."""
-    ended, interrupted = played(checked(parts, output, manner), means, manner)
+    ended, interrupted = played(prepared_batches(batches), means, manner)
     if not manner.quiet:
         summarise(ended)
     return exit_status(ended, interrupted, manner.exit_zero)
@@ -94,7 +96,7 @@ def _play(
         sequential=looks_at_rows(prepared.plan),
         shared=prepared.plan.reset == "shared",
         cut_short=batch_run.cut_short or batch_run.status == "interrupted",
-        promises={n: make_agents(prepared.plan, n)[0].promise for n in prepared.plan.cast},
+        promises={member.label: member.promise for member in prepared.cast},
     )
 
 

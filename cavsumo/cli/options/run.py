@@ -69,11 +69,14 @@ OTHERS: Mapping[str, Callable[[Callable[..., Any]], None]] = {
 
 
 def _run(options: argparse.Namespace) -> int:
-    from cavsumo.batch.executors import Means
-    from cavsumo.batch.preflight import Manner
-    from cavsumo.cli.commands.run import run_study
+    from cavsumo.batch.manner import Manner, Means
+    from cavsumo.batch.planned import planned
     from cavsumo.cli.scenario_settings import parts_of
 
     manner = Manner(**{f.name: getattr(options, f.name) for f in dataclasses.fields(Manner)})
     means = Means(options.jobs, options.executor, options.scheduler)
-    return run_study(parts_of(options), Path(options.output), means, manner)
+    batches = planned(parts_of(options), Path(options.output), manner)
+    # What can be refused quickly has been; now comes what takes long to import.
+    from cavsumo.cli.commands.run import run_study
+
+    return run_study(batches, means, manner)
