@@ -6,22 +6,20 @@ Such a tester goes wherever the name of a registered one does.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from cavsumo.agents.base import AGENTS, Agent
 from cavsumo.agents.features import across, towards
+from cavsumo.agents.names import policy_file
 from cavsumo.agents.observations import TeamObserver
 from cavsumo.agents.policy_file import TrainedPolicy, read_policy
-from cavsumo.errors import InputError, UnknownName
+from cavsumo.errors import UnknownName
 from cavsumo.model.bodies import WALKING, Action, Kind
 from cavsumo.model.registry import Parameter
 from cavsumo.model.scene import Scene
 from cavsumo.model.snapshot import Snapshot
-
-PREFIX = "policy:"
 
 
 def make_agent(spec: str, params: Mapping[str, Any]) -> Agent:
@@ -37,15 +35,6 @@ def make_agent(spec: str, params: Mapping[str, Any]) -> Agent:
 def parameters_of(spec: str) -> list[Parameter]:
     """The parameters of an agent; a policy has none, all that it is is in its file."""
     return AGENTS.parameters(spec) if policy_file(spec) is None else []
-
-
-def policy_file(spec: str) -> Path | None:
-    """The file of ``policy:FILE``, None for any other name."""
-    if not spec.startswith(PREFIX):
-        return None
-    if spec == PREFIX:
-        raise InputError(f"agent {spec!r}: expected the file of a policy, {PREFIX}FILE")
-    return Path(spec.removeprefix(PREFIX))
 
 
 class PolicyAgent(Agent):

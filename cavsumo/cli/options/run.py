@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import argparse
-import dataclasses
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
+
+from cavsumo.cli.options.values import values_of
 
 
 def add_run(commands: Any) -> None:
@@ -73,7 +74,7 @@ def _run(options: argparse.Namespace) -> int:
     from cavsumo.batch.planned import planned
     from cavsumo.cli.scenario_settings import parts_of
 
-    manner = Manner(**{f.name: getattr(options, f.name) for f in dataclasses.fields(Manner)})
+    manner = Manner(**values_of(options, Manner))
     means = Means(options.jobs, options.executor, options.scheduler)
     batches = planned(parts_of(options), Path(options.output), manner)
     # What can be refused quickly has been; now comes what takes long to import.

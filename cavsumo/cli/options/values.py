@@ -1,0 +1,12 @@
+"""From the options of a command line to the record that a command is asked by."""
+
+from __future__ import annotations
+
+import argparse
+import dataclasses
+from typing import Any
+
+
+def values_of(options: argparse.Namespace, record: Any) -> dict[str, Any]:
+    """The options that are called as the fields of a record (a dataclass)."""
+    return {field.name: getattr(options, field.name) for field in dataclasses.fields(record)}

@@ -1,0 +1,51 @@
+"""The command game: what it is asked for."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from pathlib import Path
+
+from cavsumo.cli.requests.files import check_picture
+from cavsumo.errors import InputError
+
+
+@dataclass(frozen=True)
+class SolveOptions:
+    """What to solve, and how to show it.
+
+    Attributes:
+        file: the game.
+        reading: A, B or C.
+        precision: how far the bounds may be apart.
+        trim: solve what can be solved.
+        as_json: as JSON instead of a table.
+        picture: file to draw the game's tree into.
+        policy_picture: file to draw the policy into.
+        time_limit: seconds after which to give up, None: never.
+        quiet: no progress.
+    """
+
+    file: Path
+    reading: str
+    precision: float
+    trim: bool
+    as_json: bool
+    picture: Path | None
+    policy_picture: Path | None
+    time_limit: float | None
+    quiet: bool
+
+
+def check_solve(order: SolveOptions) -> None:
+    """Refuse what can be seen to be wrong at once."""
+    if not (math.isfinite(order.precision) and order.precision > 0):
+        raise InputError(f"--precision: expected a positive number, got {order.precision:g}")
+    if order.time_limit is not None and not order.time_limit > 0:
+        raise InputError(f"--time-limit: expected positive seconds, got {order.time_limit:g}")
+    check_picture("--picture", order.picture)
+    check_picture("--policy-picture", order.policy_picture)
+    try:
+        order.file.open("rb").close()
+    except OSError as error:
+        raise InputError(f"game {str(order.file)!r}: {error.strerror}") from error
