@@ -18,6 +18,7 @@ from cavsumo.model.scenario import BatchPlan, plan_from
 from cavsumo.model.study import Part
 from cavsumo.network.network_file import root_of
 from cavsumo.results.reading import check_replaceable, read_manifest
+from cavsumo.results.writing import check_free
 
 
 @dataclass(frozen=True)
@@ -41,6 +42,7 @@ def planned(parts: Sequence[Part], output: Path, manner: Manner) -> list[Planned
     """Plan all parts of a run before any is played; raises InputError in one sentence."""
     batches = [_planned(part, part.output(output), manner) for part in parts]
     for batch in batches:
+        check_free(batch.output)
         if batch.recorded is None and not manner.overwrite:
             check_replaceable(batch.output)
     return batches

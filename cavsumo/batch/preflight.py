@@ -14,7 +14,6 @@ from cavsumo.batch.prepared import OUTPUTS, PreparedBatch, manifest, prepare
 from cavsumo.errors import ResultsError
 from cavsumo.model.study import Part
 from cavsumo.results.provenance import differences
-from cavsumo.results.writing import check_free
 
 
 @dataclass(frozen=True)
@@ -49,10 +48,7 @@ def checked(parts: Sequence[Part], output: Path, manner: Manner) -> list[Checked
 
 def prepared_batches(batches: Sequence[PlannedBatch]) -> list[CheckedBatch]:
     """The batches that were planned, with all that their processes need."""
-    found = [_checked(batch) for batch in batches]
-    for batch in found:
-        check_free(batch.output)
-    return found
+    return [_checked(batch) for batch in batches]
 
 
 def _checked(batch: PlannedBatch) -> CheckedBatch:

@@ -22,11 +22,11 @@ HYPHENATED = ("--bbox", "--ego-route", "--junction")  # options whose values may
 def main(argv: Sequence[str] | None = None) -> int:
     """The command ``cavsumo``; returns the exit status."""
     try:
-        words = sys.argv[1:] if argv is None else argv
+        words = _joined(sys.argv[1:] if argv is None else argv)
         if not words:
             _parser().print_help()
             return Exit.USAGE
-        options = _parser().parse_args(_joined(words))
+        options = _parser().parse_args(words)
         status: int = options.command(options)
         return status
     except DivergenceError as error:
