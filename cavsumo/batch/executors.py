@@ -8,8 +8,8 @@ from concurrent.futures import Executor, ThreadPoolExecutor
 from contextlib import contextmanager
 from typing import Any
 
-from cavsumo.batch.manner import Means
-from cavsumo.batch.worker import close_all
+from cavsumo.batch.manner import Means, is_client
+from cavsumo.batch.worker import Worker, close_all, join_group
 from cavsumo.errors import InputError
 
 CONNECT_S = 10.0  # how long to look for a scheduler, and for its first worker
@@ -18,10 +18,17 @@ EXECUTORS = ("local", "dask")
 
 @contextmanager
 def opened(means: Means) -> Iterator[tuple[Executor, int]]:
-    """An executor and how many episodes it plays at a time; all is ended on leaving."""
-    if means.executor == "dask":
+    """An executor and how many episodes it plays at a time; what was started is ended on leaving.
+
+    An executor of the user's is left running.
+    """
+    if isinstance(means.executor, str) and means.executor == "dask":
         with _dask(str(means.scheduler)) as (executor, threads):
             yield executor, means.jobs or threads
+    elif isinstance(means.executor, Executor):
+        yield means.executor, means.jobs or int(getattr(means.executor, "_max_workers", 1))
+    elif is_client(means.executor):
+        yield means.executor.get_executor(), means.jobs or sum(means.executor.ncores().values())
     else:
         with local_executor(means.jobs or 1) as executor:
             yield executor, means.jobs or 1
@@ -30,12 +37,13 @@ def opened(means: Means) -> Iterator[tuple[Executor, int]]:
 @contextmanager
 def local_executor(jobs: int) -> Iterator[Executor]:
     """Threads, each of which waits for a process of its own (``worker.play``)."""
-    executor = ThreadPoolExecutor(jobs, "cavsumo")
+    workers: set[Worker] = set()
+    executor = ThreadPoolExecutor(jobs, "cavsumo", initializer=join_group, initargs=(workers,))
     try:
         yield executor
     finally:
         executor.shutdown(wait=False, cancel_futures=True)
-        close_all()  # what is still played is not wanted any more
+        close_all(workers)  # what is still played is not wanted any more
         executor.shutdown(wait=True)
 
 

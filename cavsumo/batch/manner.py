@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import importlib.util
+from concurrent.futures import Executor
 from dataclasses import dataclass
+from typing import Any
 
 from cavsumo.errors import InputError
 
@@ -33,18 +35,30 @@ class Means:
 
     Attributes:
         jobs: how many at a time; None for what the executor has.
-        executor: "local" or "dask".
+        executor: "local" or "dask", or an executor that is there already: one of
+            ``concurrent.futures``, or a dask ``Client``.
         scheduler: address of dask's scheduler.
     """
 
     jobs: int | None = None
-    executor: str = "local"
+    executor: Any = "local"
     scheduler: str | None = None
 
     def __post_init__(self) -> None:
         if self.jobs is not None and self.jobs < 1:
             raise InputError(f"jobs: expected a number of at least 1, got {self.jobs}")
-        if (self.executor == "dask") != (self.scheduler is not None):
+        ours = isinstance(self.executor, str)
+        if not (ours or isinstance(self.executor, Executor) or is_client(self.executor)):
+            raise InputError(
+                "executor: expected a concurrent.futures.Executor or a dask Client, got "
+                f"{self.executor!r}"
+            )
+        if (ours and self.executor == "dask") != (self.scheduler is not None):
             raise InputError("--executor dask and --scheduler ADDRESS go together")
         if self.executor == "dask" and importlib.util.find_spec("distributed") is None:
             raise InputError("--executor dask needs a library: pip install 'cavsumo[dask]'")
+
+
+def is_client(executor: Any) -> bool:
+    """Whether this is a client of dask, which need not be installed."""
+    return hasattr(executor, "get_executor") and hasattr(executor, "ncores")

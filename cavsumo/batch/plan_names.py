@@ -9,6 +9,7 @@ from cavsumo.egos.names import EGO_NAMES
 from cavsumo.egos.reference.names import REFERENCE_NAMES
 from cavsumo.errors import InputError, UnknownName
 from cavsumo.model.bodies import kind_named
+from cavsumo.model.objects import is_object
 from cavsumo.model.scenario import NO_REFERENCE, BatchPlan
 
 
@@ -37,6 +38,8 @@ def check_names(plan: BatchPlan) -> None:
 
 def _check_agent(name: str) -> None:
     """Refuse an agent that there is not, and a policy whose file is not there."""
+    if is_object(name):
+        return
     file = policy_file(name)
     if file is None:
         AGENT_NAMES.check(name)

@@ -15,6 +15,7 @@ from cavsumo.results.column import Column, FinishedEpisode, Measured
 if TYPE_CHECKING:
     from cavsumo.agents.base import Forecast
     from cavsumo.simulation.avoidability import Avoidability
+    from cavsumo.simulation.ego_progress import EgoProgress
     from cavsumo.simulation.loop import Episode
 
 Row = dict[str, Any]
@@ -80,6 +81,11 @@ def _with_ego(episode: Episode) -> int:
     return sum("ego" in pair for pair in episode.sumo_collisions)
 
 
+def _driven(value: Callable[[EgoProgress], Any]) -> Measured:
+    """A value of the ego's drive."""
+    return Measured(lambda episode: value(episode.progress))
+
+
 def _retried(value: Callable[[Avoidability], Any]) -> Callable[[FinishedEpisode], Any]:
     """A value of what the reference driver would have done."""
     return lambda done: None if done.avoidability is None else value(done.avoidability)
@@ -98,20 +104,22 @@ _ALL = (
     Column(
         "run", "number of the episode in the batch, from 0; the key for replay", "", lambda f: f.run
     ),
-    Column("agent", "tester agent", "", lambda f: f.agent),
-    Column("ego", "vehicle under test", "", lambda f: f.plan.scenario.ego),
+    Column("agent", "tester agent", "", lambda f: f.agent, words=True),
+    Column("ego", "vehicle under test", "", lambda f: f.plan.scenario.ego, words=True),
     Column("testers", "number of tester bodies", "", lambda f: f.plan.scenario.testers),
     Column(
         "reset",
         "fresh: in a simulation of its own; shared: in one that other episodes used before",
         "",
         lambda f: "fresh" if f.fresh else "shared",
+        words=True,
     ),
     Column(
         "embodiment",
         "how SUMO was shown the testers: vehicle or person",
         "",
         lambda f: f.plan.scenario.embodiment,
+        words=True,
     ),
     Column(
         "sumo_width_m",
@@ -131,6 +139,7 @@ _ALL = (
         "agents that say nothing",
         "",
         _foretold(lambda said: said.verdict, ""),
+        words=True,
     ),
     Column(
         "forecast_value",
@@ -143,6 +152,7 @@ _ALL = (
         "violated, held, not_triggered, unfair, invalid or error",
         "",
         _judged(lambda said: said.verdict, unplayed="error"),
+        words=True,
     ),
     Column(
         "breach",
@@ -150,6 +160,7 @@ _ALL = (
         "makes the episode invalid, else the first",
         "",
         Measured(lambda episode: str(episode.breach or "")),
+        words=True,
     ),
     Column(
         "blame",
@@ -157,6 +168,7 @@ _ALL = (
         "law (docs/fairness.md); empty if no rule tells",
         "",
         Measured(lambda episode: episode.blame),
+        words=True,
     ),
     Column(
         "assertion",
@@ -164,12 +176,14 @@ _ALL = (
         "violated or alone",
         "",
         _judged(lambda said: said.assertion if said.triggered else ""),
+        words=True,
     ),
     Column(
         "verdicts",
         "what every assertion said: NAME=verdict, with blanks between",
         "",
         Measured(lambda episode: verdicts_cell(episode.verdicts)),
+        words=True,
     ),
     Column(
         "robustness",
@@ -178,7 +192,9 @@ _ALL = (
         "",
         _judged(_robustness),
     ),
-    Column("tester", "the tester's body involved", "", _judged(lambda said: said.tester)),
+    Column(
+        "tester", "the tester's body involved", "", _judged(lambda said: said.tester), words=True
+    ),
     Column(
         "trigger_time_s",
         "when the precondition triggered",
@@ -238,12 +254,52 @@ _ALL = (
         Measured(lambda episode: episode.max_decel),
     ),
     Column(
+        "arrived",
+        "1 if the ego came to the end of its route, 0 if not although the episode lasted to its "
+        "end; empty if a verdict ended the episode before",
+        "",
+        _driven(lambda ego: None if ego.arrived is None else int(ego.arrived)),
+    ),
+    Column(
+        "driven_m",
+        "how far the ego came along its route",
+        "m",
+        _driven(lambda ego: ego.driven),
+    ),
+    Column(
+        "mean_speed_mps",
+        "mean speed of the ego along its route",
+        "m/s",
+        _driven(lambda ego: ego.driven / ego.time if ego.time > 0.0 else None),
+    ),
+    Column(
+        "lost_s",
+        "time that the ego lost against a free drive to the same place: on an empty road, at the "
+        "speed limits, without lights (docs/results.md); negative if it was faster",
+        "s",
+        _driven(lambda ego: ego.lost),
+    ),
+    Column("stood_s", "how long the ego stood", "s", _driven(lambda ego: ego.stood)),
+    Column(
+        "frozen",
+        "stood if the ego had been standing for 10 s or longer when the episode ended, crawled if "
+        "it needed, while it moved, more than four times as long as the free drive; else empty",
+        "",
+        _driven(lambda ego: ego.frozen),
+    ),
+    Column(
         "avoidable",
         "1 if the reference driver would have avoided the violation, else 0; empty if not judged",
         "",
         _retried(_avoidable),
     ),
-    Column("reference", "the reference driver", "", lambda f: f.avoidability and f.plan.reference),
+    Column(
+        "reference",
+        "the reference driver",
+        "",
+        lambda f: f.avoidability and f.plan.reference,
+        words=True,
+    ),
     Column(
         "last_chance_s",
         "latest time at which it could have perceived the risk and avoided it; empty for never",
@@ -261,6 +317,7 @@ _ALL = (
         "why it was not judged, or what to doubt",
         "",
         _retried(lambda found: found.note),
+        words=True,
     ),
     Column(
         "cost",
@@ -322,8 +379,8 @@ _ALL = (
         "",
         Measured(lambda episode: episode.teleports),
     ),
-    Column("trace", "frames, relative to this file", "", _later),
-    Column("error", "what went wrong when outcome is error", "", lambda f: f.error),
+    Column("trace", "frames, relative to this file", "", _later, words=True),
+    Column("error", "what went wrong when outcome is error", "", lambda f: f.error, words=True),
     Column("wall_s", "real time; the only column that is not reproducible", "s", _later),
 )
 

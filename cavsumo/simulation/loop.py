@@ -29,6 +29,7 @@ from cavsumo.model.scene import Scene
 from cavsumo.model.seeds import starts_generator
 from cavsumo.model.sensors import Senses
 from cavsumo.model.snapshot import BodyState, Snapshot
+from cavsumo.simulation.ego_progress import EgoProgress, ego_progress
 from cavsumo.simulation.rewards import Feedback, RewardMonitor
 from cavsumo.simulation.setup import Setup
 
@@ -61,6 +62,7 @@ class Episode:
     rms_acceleration: float = 0.0
     criticality: CriticalityMonitor = field(default_factory=CriticalityMonitor)
     extremes: Extremes = field(default_factory=Extremes)
+    progress: EgoProgress = field(default_factory=EgoProgress)
     cost: float = 0.0
     reward: float = 0.0
     sumo_collisions: frozenset[tuple[str, str]] = frozenset()
@@ -111,7 +113,8 @@ class EpisodeLoop:
         self._episode = Episode(Judgement(""))
         self._episode.forecast = _foretold(agents, self.agent_views)
         self._validity = ValidityMonitor(self.scene)
-        self._history: list[Snapshot] = []  # what the blame is found from
+        self._history: list[Snapshot] = []  # what blame and progress are found from
+        self._arrived = False
         self._learners = any(type(a).process_feedback is not Agent.process_feedback for a in agents)
         self._observe(self.snapshot)
         self._end(_over(setup, self.snapshot))
@@ -131,6 +134,7 @@ class EpisodeLoop:
             episode.actions.append(actions)
         successor = setup.world.step(states, command)
         if successor is None or (episode.drives and _at_end(scene, successor)):
+            self._arrived = True
             self._end(True)
             rewards = self._rewards.lost()
             _feed_back(agents, views, actions, rewards, views)
@@ -170,6 +174,9 @@ class EpisodeLoop:
             episode.steps, self.scene.dt
         )
         spoilt = self._validity.spoils(episode.judgement)
+        late = self.snapshot.time >= self._setup.scenario.end - 1e-9
+        arrived = True if self._arrived else False if late else None
+        episode.progress = ego_progress(self.scene, self._history, arrived)
         episode.invalid, episode.breach = spoilt is not None, spoilt or self._validity.first
         if episode.outcome == VIOLATED:
             episode.blame = blamed(self.scene, self._history, episode.judgement)

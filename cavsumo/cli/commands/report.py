@@ -3,49 +3,15 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 
-from cavsumo.cli.requests.report import ReportOptions
-from cavsumo.errors import Exit, InputError
-from cavsumo.report.analysis import Report, analyse
-from cavsumo.report.formats import FORMATS
-from cavsumo.report.junit import junit
+from cavsumo.errors import Exit
+from cavsumo.report.files import write_report_files
+from cavsumo.report.order import ReportOptions
 
 
 def report(results: Sequence[Path], wanted: ReportOptions) -> int:
     """Read, compute, and say it; nothing is written when anything is wrong."""
-    write_page = _page_writer() if wanted.html is not None else None
-    found = analyse(results, wanted.by)
-    text = FORMATS[wanted.format](found)
-    xml = junit(found.evidence) if wanted.junit is not None else ""
-    if write_page is not None and wanted.html is not None:
-        write_page(found, wanted.html, wanted.replays)
-    if wanted.junit is not None:
-        _write("--junit", wanted.junit, xml)
-    if wanted.output is not None:
-        _write("--output", wanted.output, text)
-    else:
-        sys.stdout.write(text)
+    sys.stdout.write(write_report_files(results, wanted))
     return Exit.OK
-
-
-def _page_writer() -> Callable[[Report, Path, int], None]:
-    """The function that writes the page, when what draws its plots is installed."""
-    try:
-        from cavsumo.report.pages.report.document import write_report
-    except ImportError as error:
-        if (error.name or "").partition(".")[0] != "matplotlib":
-            raise
-        raise InputError(
-            "--html needs the package matplotlib: pip install 'cavsumo[plot]'"
-        ) from None
-    return write_report
-
-
-def _write(option: str, file: Path, text: str) -> None:
-    """Write a file."""
-    try:
-        file.write_text(text, encoding="utf-8", errors="backslashreplace")
-    except OSError as error:
-        raise InputError(f"{option} {str(file)!r}: cannot be written: {error.strerror}") from error

@@ -107,7 +107,7 @@ def _replay(options: argparse.Namespace) -> int:
 
 
 def _report(options: argparse.Namespace) -> int:
-    from cavsumo.cli.requests.report import ReportOptions, check_report
+    from cavsumo.report.order import ReportOptions, check_report
 
     wanted = ReportOptions(**values_of(options, ReportOptions))
     check_report(options.results, wanted)

@@ -1,4 +1,4 @@
-"""The command report: what it is asked for."""
+"""What a report is asked for, checked before anything heavy is imported."""
 
 from __future__ import annotations
 
@@ -6,7 +6,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from cavsumo.cli.requests.files import check_folder
 from cavsumo.errors import InputError
 from cavsumo.results.reading import read_manifest
 
@@ -44,7 +43,8 @@ def _check_output(option: str, file: Path | None, results: Sequence[Path]) -> No
     """Refuse to write over the results or into nowhere."""
     if file is None:
         return
-    check_folder(option, file)
+    if not file.parent.is_dir():
+        raise InputError(f"{option} {str(file)!r}: no such folder {str(file.parent)!r}")
     own = [path for csv_file in results for path in (csv_file, csv_file.with_suffix(".json"))]
     if file.resolve() in [path.resolve() for path in own]:
         raise InputError(f"{option} {str(file)!r}: is one of the results")
