@@ -1,8 +1,9 @@
 """The command line: reads words and calls what the other rooms offer; nothing is computed here.
 
-``command_line`` is the parser and the exit statuses, ``options`` the options of each command (light
-to import), ``commands`` what a command does (heavy, imported when it is called),
-``scenario_settings`` the options that are settings of a scenario.
+``command_line`` is the parser and the exit statuses, ``options`` the options of each command,
+``setting_options`` those that are settings of a scenario. ``requests`` has what a command is asked
+for and refuses what is wrong with it (light to import), ``commands`` what it does (heavy, imported
+when all of that is right).
 To add a command: its options in ``options/``, itself in ``commands/``, a line in ``command_line``.
 """
 
