@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import argparse
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
 from typing import Any, NoReturn
 
 from cavsumo import __version__
@@ -14,7 +14,7 @@ from cavsumo.cli.options.game import add_game
 from cavsumo.cli.options.networks import add_import_osm, add_inspect
 from cavsumo.cli.options.results import add_merge, add_replay, add_report
 from cavsumo.cli.options.run import add_run
-from cavsumo.errors import BatchError, CavsumoError, DivergenceError, Exit, InputError
+from cavsumo.errors import BatchError, CavsumoError, DivergenceError, Exit, InputError, UnknownName
 
 HYPHENATED = ("--bbox", "--ego-route", "--junction")  # options whose values may begin with "-"
 
@@ -23,10 +23,13 @@ def main(argv: Sequence[str] | None = None) -> int:
     """The command ``cavsumo``; returns the exit status."""
     try:
         words = _joined(sys.argv[1:] if argv is None else argv)
+        parser = _parser()
         if not words:
-            _parser().print_help()
+            parser.print_help()
             return Exit.USAGE
-        options = _parser().parse_args(words)
+        if words[0][:1] != "-" and words[0] not in parser.commands:
+            raise UnknownName("command", words[0], parser.commands)
+        options = parser.parse_args(words)
         status: int = options.command(options)
         return status
     except DivergenceError as error:
@@ -60,10 +63,12 @@ class _OptionParser(argparse.ArgumentParser):
     """argparse with our way of saying no: one sentence, exit status 2.
 
     Attributes:
+        commands: the names of the commands, of the parser that has them.
         fill: adds the options of a command whose options are read from the scenario record, once
             that command is called; the help of all commands does without them.
     """
 
+    commands: Collection[str] = ()
     fill: Callable[[argparse.ArgumentParser], None] | None = None
 
     def parse_known_args(self, args: Any = None, namespace: Any = None) -> Any:
@@ -76,7 +81,7 @@ class _OptionParser(argparse.ArgumentParser):
         raise InputError(f"{message} (see {self.prog} --help)")
 
 
-def _parser() -> argparse.ArgumentParser:
+def _parser() -> _OptionParser:
     parser = _OptionParser(
         prog="cavsumo",
         description="Which tests make this vehicle fail at this junction, are they fair, and how "
@@ -102,6 +107,7 @@ def _parser() -> argparse.ArgumentParser:
         listing = commands.add_parser(sort, help=text, description=text, allow_abbrev=False)
         listing.add_argument("name", nargs="?", help="show the parameters of this one")
         listing.set_defaults(command=_list, sort=sort)
+    parser.commands = commands.choices
     return parser
 
 

@@ -34,7 +34,7 @@ for words in json.load(sys.stdin):
 json.dump(found, sys.stdout)
 """
 REFUSED = {
-    "rnu": "invalid choice: 'rnu'",
+    "rnu": "unknown command 'rnu'; did you mean 'run'?",
     "run --trase all": "unrecognized arguments: --trase",
     "run --runs many": "--runs: invalid int value: 'many'",
     "run --runs 0": "runs: Input should be greater than or equal to 1, got 0",
