@@ -8,7 +8,7 @@ from typing import Any
 
 from cavsumo.agents.names import AGENT_NAMES, policy_file
 from cavsumo.assertions.names import ASSERTION_NAMES
-from cavsumo.egos.names import EGO_NAMES
+from cavsumo.egos.names import EGO_NAMES, EXTERNAL_NAMES
 from cavsumo.model.names import Names
 from cavsumo.model.registry import Registry
 
@@ -30,7 +30,7 @@ def registries() -> dict[str, Registry[Any]]:
 
 def listing(sort: str, name: str | None) -> str:
     """One line for each entry, or one entry with its parameters, defaults and units."""
-    if name is not None and ":" not in name:
+    if name is not None and ":" not in name and not (sort == "egos" and name in EXTERNAL_NAMES):
         NAMES[sort].check(name)
     registry = registries()[sort]
     if sort == "agents" and name is not None and name.startswith("policy:"):
