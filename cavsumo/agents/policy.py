@@ -1,6 +1,6 @@
 """Testers that a user trained: ``policy:FILE``, the format is that of ``policy_file``.
 
-Such a tester goes wherever the name of a registered one does.
+Such a tester is accepted in every place of the name of a registered one.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ def make_agent(spec: str, params: Mapping[str, Any]) -> Agent:
 
 
 def parameters_of(spec: str) -> list[Parameter]:
-    """The parameters of an agent; a policy has none, all that it is is in its file."""
+    """The parameters of an agent; a policy has none, its file defines it completely."""
     if is_object(spec):
         return _alone(spec).parameters(spec)
     return AGENTS.parameters(spec) if policy_file(spec) is None else []
@@ -58,7 +58,7 @@ def _alone(name: str) -> Registry[Agent]:
 
 
 class PolicyAgent(Agent):
-    """A trained policy; it does the same in the same situation, and learns nothing."""
+    """A trained policy; it takes equal actions in equal situations, and does not learn."""
 
     sees_background = False
 

@@ -32,9 +32,9 @@ REPORTS = {".md": "markdown", ".csv": "csv", ".json": "json", ".txt": "table"}
 
 
 class TemporaryFolder:
-    """A temporary folder for results that nobody gave a place.
+    """A temporary folder for results without an output file.
 
-    It goes with ``close``, with this object, or with the process.
+    It is removed by ``close``, with this object, or with the process.
     """
 
     def __init__(self) -> None:
@@ -70,8 +70,7 @@ class Results:
     def rows(self) -> pandas.DataFrame:
         """The episodes, a row each, by the numbers of their runs.
 
-        Numbers are numbers, and NaN stands where a value is missing. ``columns`` says what each
-        column means.
+        Numbers are numbers, NaN for missing values. ``columns`` explains the columns.
         """
         table = read_results(self.file)
         return table.set_axis(table["run"].rename(None), axis="index")
@@ -123,7 +122,7 @@ class Results:
 
         Args:
             run: its number.
-            recorded: take the frames that were kept, and play nothing.
+            recorded: use the recorded frames without playing the episode.
             net, routes: where the network and the routes are now, if not where they were.
 
         Raises:
@@ -142,7 +141,7 @@ class Results:
             file: ending in .html for a page (with replays in a folder beside it), .md, .csv,
                 .json or .txt for tables, .xml for JUnit.
             by: the column whose values are summary apart.
-            replays: of a page, how many failures have pages of their own.
+            replays: number of failures that have pages of their own, for a page.
 
         Raises InputError when the file cannot be written.
         """
@@ -169,7 +168,7 @@ class Results:
 
     @cached_property
     def _summary(self) -> ResultsSummary:
-        """What is said of them."""
+        """The summary of the results."""
         tally = Tally()
         for _, row in whole_lines(self.file):
             if row is not None:
@@ -178,7 +177,7 @@ class Results:
 
     @property
     def _place(self) -> str:
-        """Where the results lie, and how the batch stands if it is not complete."""
+        """The file of the results, and the status of an incomplete batch."""
         status = str(self.manifest.get("status"))
         words = ["" if self.folder else str(self.file), "" if status in COMPLETE else status]
         return ", ".join(filter(None, words))

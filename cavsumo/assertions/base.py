@@ -21,17 +21,17 @@ from cavsumo.model.snapshot import Snapshot
 
 
 class Assertion:
-    """Base of the assertions: watches an episode snapshot by snapshot.
+    """Base of the assertions, which evaluate an episode snapshot by snapshot.
 
     Attributes:
         name: as registered.
-        judgement: what it says so far.
-        decided: nothing that follows can change the judgement.
+        judgement: the judgement so far.
+        decided: no later snapshot can change the judgement.
         pending: the precondition held and the verdict is still open, so the episode goes on.
         sees_background: whether it looks at the background traffic or the traffic lights in the
             snapshots; contacts are reported in any case. See ``Agent.sees_background``.
         unconditional: it has no precondition, so that every episode is a test of it. Among several
-            assertions that it held makes no episode a test (``weightiest``).
+            assertions its verdict ``held`` does not make an episode a test (``weightiest``).
         unit: of the robustness.
     """
 
@@ -56,17 +56,17 @@ class Assertion:
         raise NotImplementedError
 
     def conclude(self) -> None:
-        """The episode is over: the judgement is final, of what needed all of it, too.
+        """End the episode: the judgement becomes final.
 
-        ``decided`` stays as it is unless the ego broke the assertion only now.
+        ``decided`` keeps its value unless the assertion is violated only now.
         """
 
 
 def weightiest(assertions: Sequence[Assertion]) -> Judgement:
     """The judgement that stands for an episode: the most serious, of equal ones the first.
 
-    Unless it is violated, an assertion without a precondition speaks only where there is no other:
-    that the ego kept to the speed limit does not make an episode a test of how it meets testers.
+    An assertion without a precondition counts only if it is violated or alone: an ego that keeps to
+    the speed limit does not make an episode a test of how it meets testers.
     """
     conditional = any(not a.unconditional for a in assertions)
     heard = [

@@ -12,20 +12,20 @@ SEVERITY = (VIOLATED, UNFAIR, HELD, NOT_TRIGGERED)
 
 @dataclass(frozen=True, slots=True)
 class Judgement:
-    """What an assertion says of an episode.
+    """The judgement of an assertion about an episode.
 
     Attributes:
         assertion: its name.
         verdict: ``not_triggered``: the precondition never held; ``held``: it did and the ego
-            coped; ``violated``: it did and the ego broke the assertion; ``unfair``: the tester
-            left the ego no chance.
+            satisfied the assertion; ``violated``: it did and the ego violated the assertion;
+            ``unfair``: the ego could not have avoided the contact.
         tester: id of the body involved, if any.
         trigger_time, violation_time: when the precondition began to hold, when the assertion was
-            broken [s].
+            violated [s].
         ego_speed: speed of the ego at the violation, else at the trigger [m/s].
         impact_speed: closing speed of a contact [m/s].
-        robustness: how far the ego kept from a violation, in the assertion's unit: its smallest
-            margin since the trigger, negative if and only if violated; None before the trigger.
+        robustness: the ego's smallest margin to a violation since the trigger, in the assertion's
+            unit, negative if and only if violated; None before the trigger.
     """
 
     assertion: str

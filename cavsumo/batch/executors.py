@@ -1,4 +1,4 @@
-"""Where episodes are played: in processes of this machine, or wherever dask has workers."""
+"""Executors of episodes: processes of this machine, or dask's workers."""
 
 from __future__ import annotations
 
@@ -12,13 +12,12 @@ from cavsumo.batch.manner import Means, is_client
 from cavsumo.batch.worker import Worker, close_all, join_group
 from cavsumo.errors import InputError
 
-CONNECT_S = 10.0  # how long to look for a scheduler, and for its first worker
-EXECUTORS = ("local", "dask")
+CONNECT_S = 10.0  # time limits for finding a scheduler, and its first worker
 
 
 @contextmanager
 def opened(means: Means) -> Iterator[tuple[Executor, int]]:
-    """An executor and how many episodes it plays at a time; what was started is ended on leaving.
+    """An executor and how many episodes it plays at a time; on leaving, started ones are ended.
 
     An executor of the user's is left running.
     """
@@ -43,7 +42,7 @@ def local_executor(jobs: int) -> Iterator[Executor]:
         yield executor
     finally:
         executor.shutdown(wait=False, cancel_futures=True)
-        close_all(workers)  # what is still played is not wanted any more
+        close_all(workers)  # episodes that still run are no longer needed
         executor.shutdown(wait=True)
 
 

@@ -9,33 +9,38 @@ from typing import Any
 
 from cavsumo.errors import InputError
 
+EXECUTORS = ("local", "dask")
+
 
 @dataclass(frozen=True)
 class Manner:
-    """How a run treats the results that lie there, and what it says.
+    """How a run treats existing results, and what it prints.
 
     Attributes:
         resume: go on where they end.
         retry_errors: play the episodes again that could not be played.
-        overwrite: start again even in place of an unfinished batch.
+        overwrite: start again even in place of an unfinished batch, or of another finished one.
+        scratch: the results file is not one that the user named: a finished batch there is
+            replaced, and that is said.
         quiet: no progress, no summary.
-        exit_zero: a violation is no failure.
+        exit_zero: exit with 0 after a violation.
     """
 
     resume: bool = False
     retry_errors: bool = False
     overwrite: bool = False
+    scratch: bool = False
     quiet: bool = False
     exit_zero: bool = False
 
 
 @dataclass(frozen=True)
 class Means:
-    """How episodes are played, which never changes what comes out.
+    """The means of playing episodes, which never change the results.
 
     Attributes:
-        jobs: how many at a time; None for what the executor has.
-        executor: "local" or "dask", or an executor that is there already: one of
+        jobs: how many at a time; None for the executor's number.
+        executor: "local" or "dask", or an existing executor: one of
             ``concurrent.futures``, or a dask ``Client``.
         scheduler: address of dask's scheduler.
     """
@@ -47,7 +52,7 @@ class Means:
     def __post_init__(self) -> None:
         if self.jobs is not None and self.jobs < 1:
             raise InputError(f"jobs: expected a number of at least 1, got {self.jobs}")
-        ours = isinstance(self.executor, str)
+        ours = isinstance(self.executor, str) and self.executor in EXECUTORS
         if not (ours or isinstance(self.executor, Executor) or is_client(self.executor)):
             raise InputError(
                 "executor: expected a concurrent.futures.Executor or a dask Client, got "
@@ -60,5 +65,5 @@ class Means:
 
 
 def is_client(executor: Any) -> bool:
-    """Whether this is a client of dask, which need not be installed."""
+    """Whether an object is a client of dask, which need not be installed."""
     return hasattr(executor, "get_executor") and hasattr(executor, "ncores")

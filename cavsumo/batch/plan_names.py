@@ -1,4 +1,4 @@
-"""Names in a plan, checked before anything heavy is imported."""
+"""Names in a plan, checked before heavy imports."""
 
 from __future__ import annotations
 
@@ -14,10 +14,10 @@ from cavsumo.model.scenario import NO_REFERENCE, BatchPlan
 
 
 def check_names(plan: BatchPlan) -> None:
-    """Raise UnknownName, with the nearest one, for a name that nothing has, signals included.
+    """Raise UnknownName, with the nearest name, for an unknown name, signals of formulas included.
 
-    What a colon tells where to find (``module:Class``) is looked for later, when it is built; so
-    are formulas that stand in place of a name.
+    Names with a colon (``module:Class``) are resolved later, when they are built; so are formulas
+    in place of a name.
     """
     scenario = plan.scenario
     for name in plan.cast.values():

@@ -66,7 +66,7 @@ def _planned(part: Part, output: Path, manner: Manner) -> PlannedBatch:
 
 
 def _check_output(output: Path) -> None:
-    """Refuse what cannot become a results file."""
+    """Refuse a path that cannot become a results file."""
     if not output.parent.is_dir():
         raise InputError(f"output {str(output)!r}: no such folder {str(output.parent)!r}")
     if output.suffix != ".csv":
@@ -76,9 +76,9 @@ def _check_output(output: Path) -> None:
 
 
 def _recorded(output: Path, manner: Manner) -> dict[str, Any] | None:
-    """The manifest of the batch to go on with, None for a new one.
+    """The manifest of the batch to continue, None for a new one.
 
-    With ``resume`` there may be nothing yet, so that the same command starts and goes on.
+    With ``resume`` there may be no results yet, so that the same command starts and continues.
     """
     if not (manner.resume or manner.retry_errors):
         return None
@@ -89,7 +89,7 @@ def _recorded(output: Path, manner: Manner) -> dict[str, Any] | None:
 
 
 def recorded_settings(recorded: Mapping[str, Any] | None) -> dict[str, Any]:
-    """The settings of a recorded plan; what is not given again stays as it was."""
+    """The settings of a recorded plan; settings that are not given again are kept."""
     if recorded is None:
         return {}
     try:

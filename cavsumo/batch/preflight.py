@@ -1,4 +1,4 @@
-"""A batch that was checked: what is played into which file, from the start or from where it is."""
+"""The check of a batch: its plan and its file, new or continued."""
 
 from __future__ import annotations
 
@@ -14,6 +14,9 @@ from cavsumo.batch.prepared import OUTPUTS, PreparedBatch, manifest, prepare
 from cavsumo.errors import ResultsError
 from cavsumo.model.study import Part
 from cavsumo.results.provenance import differences
+from cavsumo.results.reading import read_manifest
+
+UNESSENTIAL = frozenset({"deadline_s"})  # settings without influence on rows that are no errors
 
 
 @dataclass(frozen=True)
@@ -21,10 +24,11 @@ class CheckedBatch:
     """A batch ready to be played.
 
     Attributes:
-        name: which part of a study it is; empty for none.
+        name: its name in a study; empty for none.
         output: its results file.
         prepared, manifest: what is played.
         recorded: the manifest of the batch to go on with, None for a new one.
+        replaced: how many episodes of another finished batch lie in its place.
     """
 
     name: str
@@ -32,9 +36,10 @@ class CheckedBatch:
     prepared: PreparedBatch
     manifest: Mapping[str, Any]
     recorded: Mapping[str, Any] | None
+    replaced: int = 0
 
     def without(self, outputs: Sequence[str]) -> CheckedBatch:
-        """The same batch, but some files are what its ego writes."""
+        """The same batch, with some files as outputs of its ego."""
         prepared = self.prepared.without(outputs)
         return dataclasses.replace(
             self,
@@ -44,13 +49,54 @@ class CheckedBatch:
 
 
 def checked(parts: Sequence[Part], output: Path, manner: Manner) -> list[CheckedBatch]:
-    """Check all parts of a run before any is played; raises InputError in one sentence."""
-    return prepared_batches(planned(parts, output, manner))
+    """Check all batches of a run before any is played; raises InputError in one sentence."""
+    return prepared_batches(planned(parts, output, manner), manner)
 
 
-def prepared_batches(batches: Sequence[PlannedBatch]) -> list[CheckedBatch]:
-    """The batches that were planned, with all that their processes need."""
-    return [_checked(batch) for batch in batches]
+def prepared_batches(batches: Sequence[PlannedBatch], manner: Manner) -> list[CheckedBatch]:
+    """The planned batches with all that their processes need."""
+    return [_in_place(batch, manner) for batch in [_checked(batch) for batch in batches]]
+
+
+def _in_place(batch: CheckedBatch, manner: Manner) -> CheckedBatch:
+    """A batch whose place may be taken: by going on, or instead of what lies there."""
+    if batch.recorded is not None:
+        return batch
+    other = other_batch(batch.output, batch.manifest)
+    if other is None:
+        return batch
+    if not (manner.overwrite or manner.scratch):
+        check_kept(batch.output, batch.manifest)
+    return dataclasses.replace(batch, replaced=episodes_of(other))
+
+
+def check_kept(output: Path, manifest: Mapping[str, Any]) -> None:
+    """Raise ResultsError where another finished batch lies in a file that the user named."""
+    other = other_batch(output, manifest)
+    if other is not None:
+        different = next(differences(other, manifest, apart=UNESSENTIAL))
+        raise ResultsError(
+            f"results {str(output)!r}: hold another finished batch of {episodes_of(other)} "
+            f"episodes ({different}); --overwrite replaces it"
+        )
+
+
+def other_batch(output: Path, manifest: Mapping[str, Any]) -> dict[str, Any] | None:
+    """The manifest of another batch that has rows in a file; None where the same one has."""
+    if not (output.is_file() and output.stat().st_size > 0):
+        return None
+    try:
+        there = read_manifest(output)
+    except ResultsError:  # to be replaced although it is no batch
+        return None
+    other = any(differences(there, manifest, apart=UNESSENTIAL))
+    return there if other and episodes_of(there) else None
+
+
+def episodes_of(manifest: Mapping[str, Any]) -> int:
+    """How many episodes a finished batch has."""
+    count = manifest.get("episodes")
+    return count if isinstance(count, int) else 0
 
 
 def _checked(batch: PlannedBatch) -> CheckedBatch:

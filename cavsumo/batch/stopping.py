@@ -1,7 +1,7 @@
-"""When a batch is over before its last episode.
+"""Rules that stop a batch before its last episode.
 
-All rules but the budget look at the rows in the order of their numbers only, so that they stop at
-the same row however many processes play.
+All rules but the budget use only the rows in the order of their numbers, so that they stop at the
+same row for any number of processes.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ Rule = Callable[[Tally], str | None]
 
 
 def stopping_rule(plan: BatchPlan) -> Rule:
-    """All rules of a plan as one: why to stop now, or None.
+    """All rules of a plan as one: the reason to stop now, or None.
 
     The budget's clock starts here.
     """
@@ -33,7 +33,7 @@ def stopping_rule(plan: BatchPlan) -> Rule:
 
 
 def looks_at_rows(plan: BatchPlan) -> bool:
-    """Whether the number of episodes may depend on what they found."""
+    """Whether the number of episodes may depend on their results."""
     given = plan.until_tests, plan.until_half_width, plan.budget_s
     return plan.first or any(value is not None for value in given)
 
@@ -52,7 +52,7 @@ def _enough_tests(wanted: int) -> Rule:
 
 
 def _narrow_enough(text: str, name: str, agents: Sequence[str]) -> Rule:
-    """Every agent's interval at most so wide to either side, on average."""
+    """Stop when the mean half-width of every agent's interval is small enough."""
     assert name in RATES
     limit, relative = half_width(text)
 

@@ -1,4 +1,4 @@
-"""The table that ends a run: what each agent found, with intervals."""
+"""The table that ends a run: the results of each agent, with intervals."""
 
 from __future__ import annotations
 
@@ -23,16 +23,16 @@ WIDTH, WIDEST = 120, 1000  # a table cut off at the edge of a narrow terminal wo
 
 @dataclass(frozen=True)
 class Ended:
-    """What a batch came to.
+    """Result of a finished batch.
 
     Attributes:
-        name: which part of a study it is; empty for none.
-        csv_file, tally, traces: its results, what was found, how many traces there are.
-        sequential: the number of episodes may depend on what they found, so the intervals must
-            hold however it was decided to stop.
+        name: its name in a study; empty for none.
+        csv_file, tally, traces: its results file, its counts, the number of traces.
+        sequential: the number of episodes may depend on their results, so the intervals must be
+            valid at any stopping time.
         shared: episodes shared simulations, and those played in a fresh one are found tests.
-        cut_short: somebody stopped it.
-        promises: by agent, against whom its forecasts hold.
+        cut_short: the user stopped it.
+        promises: by agent, the class of egos for which its forecasts hold.
     """
 
     name: str
@@ -80,7 +80,7 @@ def summarise(ended: Sequence[Ended]) -> None:
 
 
 def _table(ended: Sequence[Ended]) -> Table:
-    """One line an agent, of each batch."""
+    """One line per agent of each batch."""
     several = any(one.name for one in ended)
     table = Table(box=None, pad_edge=False, padding=(0, 2, 0, 0))
     for title in ("batch", "agent") if several else ("agent",):
@@ -98,7 +98,7 @@ def _table(ended: Sequence[Ended]) -> Table:
 
 
 def _verdicts(ended: Sequence[Ended]) -> Table:
-    """One line an assertion, agent and batch: in how many episodes it said what."""
+    """One line per assertion, agent and batch: the number of episodes with each verdict."""
     table = Table(box=None, pad_edge=False, padding=(0, 2, 0, 0))
     several = any(one.name for one in ended)
     for title in ("batch", "agent", "assertion") if several else ("agent", "assertion"):
@@ -115,7 +115,7 @@ def _verdicts(ended: Sequence[Ended]) -> Table:
 
 
 def _files(ended: Sequence[Ended]) -> str:
-    """Where the results lie."""
+    """The files of the results."""
     first, last = ended[0], ended[-1]
     if first is not last:
         return f"{first.csv_file} to {last.csv_file.name} ({len(ended)} batches)"
@@ -126,7 +126,7 @@ def _files(ended: Sequence[Ended]) -> str:
 
 
 def _say_shared(ended: Sequence[Ended], console: Console) -> None:
-    """How many tests that were found in shared simulations did not come out again."""
+    """The number of tests from shared simulations that did not occur again."""
     found = [one.tally.all for one in ended if one.shared]
     fresh, tests = sum(one.fresh for one in found), sum(one.tests for one in found)
     if fresh:
@@ -139,7 +139,7 @@ def _say_shared(ended: Sequence[Ended], console: Console) -> None:
 
 
 def _say_invalid(ended: Sequence[Ended], console: Console) -> None:
-    """In how many episodes a tester broke the rules of the world, and the first of them."""
+    """The number of invalid episodes, and the first of them."""
     count = sum(one.tally.all.invalid for one in ended)
     row, where = _first(ended, INVALID)
     if row is not None:
@@ -147,7 +147,7 @@ def _say_invalid(ended: Sequence[Ended], console: Console) -> None:
 
 
 def _say_errors(ended: Sequence[Ended], console: Console) -> None:
-    """How many episodes could not be run, and the first of them."""
+    """The number of error episodes, and the first of them."""
     errors = sum(one.tally.all.errors for one in ended)
     row, where = _first(ended, "error")
     if row is not None:
@@ -159,7 +159,7 @@ def _say_errors(ended: Sequence[Ended], console: Console) -> None:
 
 
 def _first(ended: Sequence[Ended], what: str) -> tuple[Row | None, str]:
-    """The first row of a kind, and of which of several results it is."""
+    """The first row of a kind, and its results file among several."""
     for one in ended:
         row = one.tally.first.get(what)
         if row is not None:
@@ -186,7 +186,7 @@ def _cells(found: Found, sequential: bool, invalid: bool) -> list[str]:
 
 
 def _say_forecasts(one: Ended, console: Console) -> None:
-    """How many starts an agent said to be sure and not forceable, and what became of them."""
+    """The forecasts of an agent, and the tests that resulted."""
     for agent, found in one.tally.agents.items():
         said = {verdict: found.forecasts.get(verdict, Counter()) for verdict in VERDICTS}
         if found.forecasts:
@@ -202,7 +202,7 @@ def _say_forecasts(one: Ended, console: Console) -> None:
 
 
 def _say_preventable(one: Ended, console: Console) -> None:
-    """How many failures of a batch the reference driver would have avoided, if that was asked."""
+    """The number of failures that the reference driver would have avoided, if they were judged."""
     row = one.tally.first.get("failure")
     reference = str(row.get("reference") or "") if row else ""
     if reference not in REFERENCES:
@@ -220,7 +220,7 @@ def _say_preventable(one: Ended, console: Console) -> None:
 
 
 def _say_first(ended: Sequence[Ended], console: Console) -> None:
-    """Point to the first failure, else the first test, and how to see it again."""
+    """Print the first failure, else the first test, with its replay command."""
     for what in ("failure", "test"):
         for one in ended:
             row = one.tally.first.get(what)
@@ -235,13 +235,13 @@ def _say_first(ended: Sequence[Ended], console: Console) -> None:
 
 
 def event(row: Row) -> str:
-    """What happened in a test, when and with whom."""
+    """The event of a test, with its time and body."""
     violated = is_failure(row)
     when = float(row["violation_time_s"] if violated else row["trigger_time_s"])
     hit = violated and cell(row["impact_speed_mps"])
     what = "collision" if hit else f"{row['assertion']} {'violated' if violated else 'triggered'}"
-    whom = f" with {row['tester']}" if row["tester"] else ""
-    return f"{what} at {when:.1f} s{whom}"
+    tester = f" with {row['tester']}" if row["tester"] else ""
+    return f"{what} at {when:.1f} s{tester}"
 
 
 def _say(console: Console, text: str) -> None:

@@ -1,4 +1,4 @@
-"""What a batch found so far, counted row by row: small, however many rows there are."""
+"""The counts of a batch so far, row by row, in bounded memory."""
 
 from __future__ import annotations
 
@@ -17,15 +17,15 @@ RATES = ("tests", "failures")
 
 @dataclass
 class Found:
-    """What one agent found.
+    """The counts of one agent.
 
     Attributes:
-        outcomes: how often each outcome came out.
-        fresh: how many rows are of episodes in a simulation of their own.
+        outcomes: the number of episodes with each outcome.
+        fresh: the number of rows of episodes in a simulation of their own.
         times: when tests were triggered, by time [s] to three decimals.
-        verdicts: for each assertion, how often it said what.
+        verdicts: for each assertion, the number of episodes with each verdict.
         preventable: failures that the reference driver would have avoided (True) or not (False).
-        forecasts: by what was said before the episode, in how many there was a test (True) or not.
+        forecasts: by forecast, the number of episodes with a test (True) and without.
     """
 
     outcomes: Counter[str] = field(default_factory=Counter)
@@ -37,37 +37,37 @@ class Found:
 
     @property
     def episodes(self) -> int:
-        """How many were played."""
+        """The number of episodes played."""
         return self.outcomes.total()
 
     @property
     def valid(self) -> int:
-        """How many count as tried."""
+        """The number of valid episodes."""
         return self.episodes - self.errors - self.invalid
 
     @property
     def tests(self) -> int:
-        """How many were tests."""
+        """The number of tests."""
         return self.outcomes[HELD] + self.outcomes[VIOLATED]
 
     @property
     def failures(self) -> int:
-        """How many tests the ego failed."""
+        """The number of tests that the ego failed."""
         return self.outcomes[VIOLATED]
 
     @property
     def unfair(self) -> int:
-        """How many left the ego no chance."""
+        """The number of unfair episodes."""
         return self.outcomes[UNFAIR]
 
     @property
     def invalid(self) -> int:
-        """In how many a tester broke the rules of the world."""
+        """The number of invalid episodes."""
         return self.outcomes[INVALID]
 
     @property
     def errors(self) -> int:
-        """How many could not be played."""
+        """The number of error episodes."""
         return self.outcomes["error"]
 
     def rate(self, name: str, *, sequential: bool = False) -> Rate:
@@ -88,9 +88,9 @@ class Tally:
     """Counts rows by agent.
 
     Attributes:
-        agents: what each agent found, in the order in which they first appear.
+        agents: the counts of each agent, in the order in which they first appear.
         first: the first row of each kind: "failure", "test", "invalid", "error".
-        rows: how many rows there were.
+        rows: the number of rows.
     """
 
     def __init__(self) -> None:
@@ -99,7 +99,7 @@ class Tally:
         self.rows = 0
 
     def add(self, row: Row) -> None:
-        """Count one more row, as it was made or as it was read."""
+        """Count one more row, as made or as read."""
         found = self.agents.setdefault(row["agent"], Found())
         self.rows += 1
         found.outcomes[row["outcome"]] += 1
@@ -120,12 +120,12 @@ class Tally:
 
     @property
     def all(self) -> Found:
-        """What all agents found together."""
+        """The counts of all agents together."""
         return found_by(self.agents.values())
 
 
 def found_by(agents: Iterable[Found]) -> Found:
-    """What several agents found together, but for the times."""
+    """The counts of several agents together, without the times."""
     together = Found()
     for found in agents:
         together.outcomes.update(found.outcomes)
@@ -135,7 +135,7 @@ def found_by(agents: Iterable[Found]) -> Found:
 
 
 def tallied(rows: Iterable[Row]) -> Found:
-    """What some rows found, whoever their agents are."""
+    """The counts of some rows, of any agents."""
     tally = Tally()
     for row in rows:
         tally.add(row)
@@ -143,7 +143,7 @@ def tallied(rows: Iterable[Row]) -> Found:
 
 
 def _nth(ordered: list[tuple[float, int]], n: int) -> float:
-    """The n-th of values given with how often they occur, in order."""
+    """The n-th of values with multiplicities, in order."""
     for value, count in ordered:
         n -= count
         if n < 0:

@@ -1,10 +1,10 @@
-"""The command line: reads words and calls what the other rooms offer; nothing is computed here.
+"""The command line: parses options and calls the other rooms, which do all computation.
 
 ``command_line`` is the parser and the exit statuses, ``options`` the options of each command,
-``setting_options`` those that are settings of a scenario. ``requests`` has what a command is asked
-for and refuses what is wrong with it (light to import), ``commands`` what it does (heavy, imported
-when all of that is right).
-To add a command: its options in ``options/``, itself in ``commands/``, a line in ``command_line``.
+``setting_options`` those that are read from the scenario record. ``requests`` are the records that
+commands take, with checks (light to import), ``commands`` the commands (heavy, imported when all
+checks have passed).
+To add a command: a file with ``add_NAME`` in ``options/``, a file in ``commands/``.
 """
 
 from cavsumo.cli.command_line import main

@@ -8,12 +8,7 @@ from collections.abc import Callable, Collection, Sequence
 from typing import Any, NoReturn
 
 from cavsumo import __version__
-from cavsumo.cli.options.certify import add_certify
-from cavsumo.cli.options.check_ego import add_check_ego
-from cavsumo.cli.options.game import add_game
-from cavsumo.cli.options.networks import add_import_osm, add_inspect
-from cavsumo.cli.options.results import add_merge, add_replay, add_report
-from cavsumo.cli.options.run import add_run
+from cavsumo.cli.options import adders
 from cavsumo.errors import BatchError, CavsumoError, DivergenceError, Exit, InputError, UnknownName
 
 HYPHENATED = ("--bbox", "--ego-route", "--junction")  # options whose values may begin with "-"
@@ -60,7 +55,7 @@ def _joined(words: Sequence[str]) -> list[str]:
 
 
 class _OptionParser(argparse.ArgumentParser):
-    """argparse with our way of saying no: one sentence, exit status 2.
+    """argparse with errors in one sentence and exit status 2.
 
     Attributes:
         commands: the names of the commands, of the parser that has them.
@@ -90,15 +85,8 @@ def _parser() -> _OptionParser:
     )
     parser.add_argument("--version", action="version", version=f"cavsumo {__version__}")
     commands = parser.add_subparsers(title="commands", required=True, metavar="COMMAND")
-    add_run(commands)
-    add_replay(commands)
-    add_report(commands)
-    add_merge(commands)
-    add_certify(commands)
-    add_check_ego(commands)
-    add_inspect(commands)
-    add_import_osm(commands)
-    add_game(commands)
+    for add in adders():
+        add(commands)
     for sort, text in (
         ("agents", "list the tester agents"),
         ("egos", "list the vehicles under test"),

@@ -1,4 +1,4 @@
-"""What there is to choose from: agents, egos, assertions."""
+"""Listings of agents, egos and assertions."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ def listing(sort: str, name: str | None) -> str:
     shown = {
         f"{p.name}={p.default}": p.doc
         for p in registry.parameters(name)
-        if p.default is not Parameter.empty  # what stands behind the colon
+        if p.default is not Parameter.empty  # the part after the colon
     }
     return "\n".join(
         [f"{name}: {registry.summary(name)}", *(f"  {line}" for line in _columns(shown))]
@@ -54,13 +54,13 @@ def listing(sort: str, name: str | None) -> str:
 
 
 def _columns(lines: Mapping[str, str]) -> list[str]:
-    """Two columns, the first as wide as need be."""
+    """Two columns, the first as wide as needed."""
     width = max(map(len, lines), default=0)
     return [f"{first:{width}}  {second}" for first, second in lines.items()]
 
 
 def _forms(sort: str) -> Mapping[str, str]:
-    """How one from the user is named."""
+    """The forms of a user's name."""
     from cavsumo.assertions import specs as assertions
     from cavsumo.egos import specs as egos
 
@@ -77,14 +77,14 @@ def _with_own(assertion: str) -> Registry[Any]:
 
 
 def _registry_of(ego: str, registered: Registry[Any]) -> Registry[Any]:
-    """Where the parameters of an ego are found: exec and tcp have a registry of their own."""
+    """The registry of an ego's parameters: exec and tcp have their own."""
     from cavsumo.egos.external.ego import EXTERNAL
 
     return EXTERNAL if ego.partition(":")[0] in EXTERNAL else registered
 
 
 def _policy(spec: str) -> str:
-    """What a policy file says of itself."""
+    """The description of a policy file."""
     from cavsumo.agents.policy_file import read_policy
 
     file = policy_file(spec)

@@ -1,8 +1,8 @@
 """The networks that come with cavsumo, by name: ``crossing`` instead of a path.
 
-They lie in the package (``data/`` of a wheel) or, in a checkout, in ``networks/`` and ``routes/``
-beside it. Plans, manifests and traces hold the name and not the place, which differs from machine
-to machine. A file of that name goes before; a folder does not, since traces have folders.
+They are in the package (``data/`` of a wheel) or, in a checkout, in ``networks/`` and ``routes/``
+beside it. Plans, manifests and traces contain the name, not the path, which differs between
+machines. A file of that name takes precedence; a folder does not, since traces have folders.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from cavsumo.errors import InputError, UnknownName
 DEFAULT = "crossing"
 ENDING = ".net.xml"
 OSM_ENDINGS = (".osm", ".osm.xml", ".osm.gz", ".osm.xml.gz", ".osm.bz2", ".pbf")
-ROUTES = Path("cavsumo/data/routes")  # stands for the folder of their demand, wherever it is
+ROUTES = Path("cavsumo/data/routes")  # stands for the folder of their demand
 
 
 def names() -> list[str]:
@@ -25,17 +25,17 @@ def names() -> list[str]:
 
 
 def is_named(net: Path) -> bool:
-    """Whether this is the name of a network, and no file."""
+    """Whether a word is the name of a network and not a file."""
     return not net.is_file() and str(net) in names()
 
 
 def network_file(net: Path) -> Path:
-    """The file of a network: of the one with that name, else the path as it is."""
+    """The file of the network with that name, or the path itself."""
     return _folder("networks") / f"{net}{ENDING}" if is_named(net) else net
 
 
 def check_network(net: Path, source: str = "") -> None:
-    """Raise InputError for what is not meant as a network: an unknown name, OpenStreetMap data."""
+    """Raise InputError for an unknown name of a network, and for OpenStreetMap data."""
     if net.name.lower().endswith(OSM_ENDINGS):
         target = net.name.split(".")[0] + ENDING
         command = shlex.join(["cavsumo", "import-osm", str(net), "-o", target])
@@ -48,7 +48,7 @@ def check_network(net: Path, source: str = "") -> None:
 
 
 def is_word(net: Path) -> bool:
-    """Whether this can be meant as a name: no folder before it, no ending after it."""
+    """Whether a path could be a name: it has neither a folder nor an ending."""
     return net.name == str(net) and bool(net.name) and not net.suffix
 
 
@@ -59,7 +59,7 @@ def routes_of(name: Path) -> Path | None:
 
 
 def routes_file(routes: Path) -> Path:
-    """The file of a demand: of a named network's, else the path as it is."""
+    """The file of the demand of a named network, or the path itself."""
     named = routes.parent == ROUTES and not routes.is_file()
     return _folder("routes") / routes.name if named else routes
 

@@ -1,4 +1,4 @@
-"""What a SUMO network offers a test: lanes, pavements, crossings, carriageway.
+"""A SUMO network: lanes, pavements, crossings, carriageway.
 
 Read with sumolib; ids are opaque and never parsed, lane 0 is not assumed to be for driving, and
 no side of the road is taken for granted.
@@ -31,7 +31,7 @@ class Network:
     """A network file, read once.
 
     Attributes:
-        file: where it came from.
+        file: the path.
         net: the sumolib network.
         root: the attributes of its <net>.
         edges: its normal edges, in the order of their ids.
@@ -105,7 +105,7 @@ class Network:
     def ground(self, line: LineString, reach_m: float) -> shapely.Geometry:
         """All lanes, crossings and walking areas, as one surface, within a distance of a line [m].
 
-        Lanes without a surface are left out: nobody can walk on them.
+        Lanes without a surface are left out, since no body can be on them.
         """
         insides = [e for kind in ("internal", "crossing") for e in self.inside(kind)]
         lanes = [
@@ -135,9 +135,9 @@ class Network:
 
 
 def read_network(file: FilePath, *, foes: bool = False) -> Network:
-    """Read a .net.xml or .net.xml.gz; raises NetworkError in one sentence when it is none.
+    """Read a .net.xml or .net.xml.gz; raises NetworkError in one sentence for any other file.
 
-    ``foes``: with the tables of who gives way to whom, which take long on large networks.
+    ``foes``: with the tables of right of way, which take long on large networks.
     """
     root = root_of(file)
     try:

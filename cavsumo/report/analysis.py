@@ -1,4 +1,4 @@
-"""Everything that a report says, in one record; nothing here knows how it is shown."""
+"""All figures of a report in one record, independent of their presentation."""
 
 from __future__ import annotations
 
@@ -22,12 +22,12 @@ class Report:
 
     Attributes:
         by: the column that rows are grouped by besides their agents; "agent" for none.
-        evidence: the rows and where they come from.
-        groups: the rows told together.
+        evidence: the rows and their sources.
+        groups: the groups of rows.
         rates, times, efforts, distinct: one entry a group, in the same order.
         comparisons: groups in pairs, on the same seeds.
-        tests: what the traces tell of each test, by the index of its row.
-        failures: failures that are alike, the most frequent first.
+        tests: the data of each test from its trace, by the index of its row.
+        failures: classes of similar failures, the most frequent first.
     """
 
     by: str
@@ -43,7 +43,7 @@ class Report:
 
 
 def analyse(files: Sequence[Path], by: str = "agent") -> Report:
-    """Read results and compute all that a report says; raises InputError for what is wrong."""
+    """Read results and compute all figures of a report; raises InputError for wrong input."""
     evidence = load(files, by)
     groups = grouped(evidence, by)
     tests = described(evidence)

@@ -20,7 +20,7 @@ from cavsumo.report.pairs import (
     sequential_ratio_interval,
 )
 
-# What is compared: of a valid episode, whether it was a test, and whether the ego failed.
+# The compared events of a valid episode: it was a test, and the ego failed it.
 EVENTS: dict[str, Callable[[pandas.DataFrame], pandas.Series]] = {
     "tests": lambda rows: rows["outcome"].isin(("held", "violated")),
     "failures": lambda rows: rows["outcome"] == "violated",
@@ -32,15 +32,15 @@ class PairedComparison:
     """Two groups on the same seeds.
 
     Attributes:
-        setting: which setting, if there are several.
-        first, second: who is compared: agents, or values of the column for one agent.
-        agent: the agent that both are of; empty when agents are compared.
-        event: what is counted: tests or failures.
-        pairs: the pairs of valid episodes by what happened in them.
+        setting: the setting, if there are several.
+        first, second: the compared agents, or values of the column for one agent.
+        agent: the agent of both; empty when agents are compared.
+        event: the counted event, tests or failures.
+        pairs: the pairs of valid episodes by their events.
         ratio: the first's rate over the second's; infinite over none, None when neither has any.
         interval: its 95 % interval.
         p, p_holm: McNemar's p-value; the same adjusted for all comparisons of the report.
-        sequential: interval and p-value hold whenever one stops.
+        sequential: interval and p-value are valid at any stopping time.
     """
 
     setting: str
@@ -57,9 +57,9 @@ class PairedComparison:
 
 
 def comparisons(groups: Sequence[Group], by: str = "agent") -> list[PairedComparison]:
-    """All pairs of groups that differ in what rows are grouped by and in nothing else.
+    """All pairs of groups that differ only in the column by which rows are grouped.
 
-    The later one comes first, so that the first agent named is what others are compared with.
+    The later one comes first, so that the other agents are compared with the first agent.
     """
     found = [
         _compared(later, earlier, event, by)

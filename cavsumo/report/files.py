@@ -1,4 +1,4 @@
-"""A report in files, by their formats; everything is computed before anything is written."""
+"""A report in files, by their formats; all figures are computed before a file is written."""
 
 from __future__ import annotations
 

@@ -12,13 +12,13 @@ from cavsumo.results.reading import read_manifest
 
 @dataclass(frozen=True)
 class ReportOptions:
-    """What a report is asked for.
+    """The options of a report.
 
     Attributes:
-        by: the column whose values are told apart.
-        format: of what is printed, or written to output.
+        by: the column whose values are reported separately.
+        format: of the text that is printed or written to output.
         output, junit, html: files to write.
-        replays: how many failures the page shows as pages of their own.
+        replays: number of failures with pages of their own.
     """
 
     by: str = "agent"

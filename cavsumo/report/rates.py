@@ -1,4 +1,4 @@
-"""What a group found, as shares with intervals."""
+"""The results of a group, as shares with intervals."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from cavsumo.batch.tally import Found
 from cavsumo.report.grouping import Group, Told
 from cavsumo.results.statistics import Rate, rate, sequential_rate
 
-NO_RULE = "no rule"  # of those that blame knows
+NO_RULE = "no rule"  # the rules of ``blame``
 WILSON, EXACT, SEQUENTIAL = "Wilson", "Clopper-Pearson", "confidence sequence"
 
 
@@ -20,10 +20,10 @@ class Share:
     """A share of something, with its 95 % intervals by the names of the methods.
 
     Attributes:
-        count, total: how many of how many.
-        of: of what.
-        intervals: by Wilson and by Clopper and Pearson; or, where the number of episodes may depend
-            on what they found, the confidence sequence alone, for the others would not hold.
+        count, total: the numbers.
+        of: the meaning of the total.
+        intervals: by Wilson and by Clopper and Pearson; or, if the number of episodes may depend on
+            their results, the confidence sequence alone, because the others would not be valid.
     """
 
     count: int
@@ -42,11 +42,11 @@ class Rates(Told):
     """The shares of one group.
 
     Attributes:
-        episodes, invalid, errors: how many there are, in how many a tester broke the rules of the
-            world, how many could not be played.
+        episodes, invalid, errors: numbers of episodes, of those in which a tester broke the rules
+            of the world, of those that could not be played.
         tests, failures, unfair: of valid episodes, of tests, of valid episodes.
         preventable: failures that the reference driver would have avoided, of those judged.
-        reference: who that is, empty if none was judged.
+        reference: its name, empty if none was judged.
         blame: by the rule broken first, as ``party:rule``, the most frequent first: of failures.
     """
 
@@ -90,7 +90,7 @@ def rates(group: Group) -> Rates:
 
 
 def share(count: int, total: int, of: str, *, sequential: bool) -> Share:
-    """A share with the intervals that hold for it."""
+    """A share with its valid intervals."""
     if sequential:
         return Share(count, total, of, {SEQUENTIAL: sequential_rate(count, total)})
     both = {WILSON: rate(count, total), EXACT: rate(count, total, "exact")}

@@ -1,10 +1,9 @@
-"""How long until the first test: within an episode, with censoring, and across the batch.
+"""The time to the first test: within an episode, with censoring, and across the batch.
 
 Within an episode the time to the trigger is estimated by Kaplan and Meier (1958, J. Am. Stat.
 Assoc. 53, 457; by scipy), with the log-log interval on Greenwood's variance. An episode without a
-test is censored at its end. So is an unfair one: the tester came too early for a test, which says
-that there was none so far and not when there would have been one; to count it as a test would
-reward testers that are unfair quickly.
+test is censored at its end. So is an unfair one: it shows that there was no test so far, and not
+when there would have been one; counting it as a test would reward testers that are unfair quickly.
 """
 
 from __future__ import annotations
@@ -30,10 +29,10 @@ class Curve:
     """The share of episodes without a test so far.
 
     Attributes:
-        times: when it changes, and when an episode was censored [s], ascending.
+        times: times of its changes and of censoring [s], ascending.
         share: from each of these times on.
         low, high: its pointwise 95 % interval, NaN where there is none.
-        at_risk, events: how many episodes still ran just before, how many tests came then.
+        at_risk, events: numbers of episodes still running just before, and of tests then.
     """
 
     times: Floats
@@ -46,10 +45,10 @@ class Curve:
 
 @dataclass(frozen=True)
 class TimeToTest(Told):
-    """When tests come.
+    """The times of tests.
 
     Attributes:
-        tests, censored: how many episodes ended with a test, how many without.
+        tests, censored: numbers of episodes with and without a test.
         median: the time by which half of the episodes would have had a test [s]; None when fewer
             have one before the last is censored.
         median_interval: its 95 % interval [s], where the curve's interval crosses one half
@@ -57,9 +56,9 @@ class TimeToTest(Told):
         mean, mean_interval: the mean time without a test up to the limit [s], normal interval; no
             interval without any test before the limit.
         limit: the time up to which the mean is taken [s], one for all groups.
-        first_test, first_failure: which of the group's valid episodes was the first, from 1; None
+        first_test, first_failure: number of the first of the group's valid episodes, from 1; None
             for none (that is, more than all of them).
-        curve: the whole estimate; None without episodes.
+        curve: the estimate; None without episodes.
     """
 
     tests: int
@@ -75,7 +74,7 @@ class TimeToTest(Told):
 
 
 def times_to_test(groups: Sequence[Group]) -> list[TimeToTest]:
-    """One estimate a group, with a common limit for the means."""
+    """One estimate per group, with a common limit for the means."""
     curves = [kaplan_meier(*times_and_events(group.valid)) for group in groups]
     limit = min((float(curve.times[-1]) for curve in curves if curve is not None), default=None)
     return [_estimate(group, curve, limit) for group, curve in zip(groups, curves, strict=True)]
@@ -113,7 +112,7 @@ def kaplan_meier(times: Floats, events: NDArray[np.bool_]) -> Curve | None:
 
 
 def median(curve: Curve) -> tuple[float | None, Interval | None]:
-    """When the curve reaches one half, and between which times that lies."""
+    """The time at which the curve reaches one half, with its interval."""
     middle = _first_at_half(curve.times, curve.share)
     low, high = _first_at_half(curve.times, curve.low), _first_at_half(curve.times, curve.high)
     if middle is None and low is None:
@@ -152,7 +151,7 @@ def restricted_mean(curve: Curve, limit: float) -> tuple[float, Interval | None]
 
 
 def _estimate(group: Group, curve: Curve | None, limit: float | None) -> TimeToTest:
-    """What is said of one group."""
+    """The estimate of one group."""
     valid = group.valid
     tests = int(EVENTS["tests"](valid).sum())
     middle, around = median(curve) if curve is not None else (None, None)
@@ -175,5 +174,5 @@ def _estimate(group: Group, curve: Curve | None, limit: float | None) -> TimeToT
 
 
 def _first(happened: pandas.Series) -> int | None:
-    """The number of the first episode in which it happened, from 1."""
+    """The number of the first episode with an event, from 1."""
     return int(happened.to_numpy().argmax()) + 1 if happened.any() else None

@@ -18,7 +18,7 @@ SHOWN = 10  # cells of failures
 
 
 def tables(report: Report) -> Iterator[Table]:
-    """All tables that have anything to say."""
+    """All tables with at least one row."""
     labels = Labels(report)
     yield _batches(report.evidence.batches, report)
     if not report.groups:
@@ -35,7 +35,7 @@ def tables(report: Report) -> Iterator[Table]:
 
 
 def _batches(batches: Sequence[Batch], report: Report) -> Table:
-    """What was read."""
+    """The files that were read."""
     counts = report.evidence.rows["batch"].value_counts()
     rows = []
     for i, batch in enumerate(batches):
@@ -51,7 +51,7 @@ def _batches(batches: Sequence[Batch], report: Report) -> Table:
 
 
 def _batch_notes(batches: Sequence[Batch]) -> Iterator[str]:
-    """What is special about them."""
+    """Notes on special batches."""
     for batch in batches:
         if batch.sequential:
             reason = batch.manifest.get("stopped_by")
@@ -93,7 +93,7 @@ def _rates(found: Sequence[Rates], labels: Labels) -> Table:
 
 
 def _blame(found: Sequence[Rates], labels: Labels) -> Table:
-    """Which rules were broken first where the ego failed."""
+    """The rules broken first in failures."""
     methods = _methods(found)
     rows = [
         [*labels.cells(one), rule, *_share(share, methods)]
@@ -107,7 +107,7 @@ def _blame(found: Sequence[Rates], labels: Labels) -> Table:
 
 
 def _methods(found: Sequence[Rates]) -> list[str]:
-    """By which methods there are intervals."""
+    """The methods of the intervals."""
     used = {method for one in found for method in one.tests.intervals}
     return [method for method in (WILSON, EXACT, SEQUENTIAL) if method in used]
 
@@ -119,7 +119,7 @@ def _share(share: Share, methods: Sequence[str]) -> list[str]:
 
 
 def _comparisons(report: Report, labels: Labels) -> Iterator[Table]:
-    """Who finds more on the same seeds."""
+    """The comparisons on the same seeds."""
     words = [title for title in labels.titles if title == "setting"]
     words += ["agent"] if report.by != "agent" else []
     numbers = ("pairs", "only first", "only second", "ratio", "95 % interval", "p", "p (Holm)")
@@ -133,7 +133,7 @@ def _comparisons(report: Report, labels: Labels) -> Iterator[Table]:
 
 
 def _comparison(one: PairedComparison, words: Sequence[str]) -> list[str]:
-    """One line of them."""
+    """One row of the comparison table."""
     who = [getattr(one, word) for word in words]
     return [
         *who,
@@ -149,7 +149,7 @@ def _comparison(one: PairedComparison, words: Sequence[str]) -> list[str]:
 
 
 def _comparison_notes(found: Sequence[PairedComparison]) -> list[str]:
-    """By which methods."""
+    """The methods of the comparisons."""
     methods = []
     if any(not one.sequential for one in found):
         methods.append(
@@ -165,7 +165,7 @@ def _comparison_notes(found: Sequence[PairedComparison]) -> list[str]:
 
 
 def _times(found: Sequence[TimeToTest], labels: Labels) -> Table:
-    """When tests come."""
+    """The times of tests."""
     limit = next((one.limit for one in found if one.limit is not None), None)
     mean = "mean" if limit is None else f"mean to {limit:.1f}"
     rows = [
@@ -192,7 +192,7 @@ def _times(found: Sequence[TimeToTest], labels: Labels) -> Table:
 
 
 def _effort(report: Report, labels: Labels) -> Table:
-    """What tests and failures cost."""
+    """The rates of tests and failures per second."""
     rows = []
     for rate, one in zip(report.rates, report.efforts, strict=True):
         for what in EVENTS:
@@ -213,13 +213,13 @@ def _effort_cells(found: PerSecond) -> list[str]:
 
 
 def _total(efforts: Sequence[Effort]) -> str:
-    """How long it all took."""
+    """The total times."""
     simulated, real = sum(e.simulated_s for e in efforts), sum(e.real_s for e in efforts)
     return f"{simulated:,.0f} s were simulated in {real:,.1f}"
 
 
 def _distinct(found: Sequence[Distinct], labels: Labels) -> Table:
-    """How many differ."""
+    """The numbers of distinct tests and failures."""
     rows = []
     for one in found:
         for what in EVENTS:
@@ -243,14 +243,14 @@ def _distinct(found: Sequence[Distinct], labels: Labels) -> Table:
 
 
 def _diversity_cells(diversity: Diversity) -> list[str]:
-    """How many differ, in one group."""
+    """The numbers of distinct tests and failures of one group."""
     estimate = "" if diversity.estimate is None else f"{diversity.estimate:.0f}"
     counts = [diversity.total, diversity.known, diversity.cells]
     return [*map(str, counts), estimate, percent(diversity.new)]
 
 
 def _failures(found: Sequence[FailureCell], several: bool) -> Table:
-    """The most frequent cells of failures, each with one to look at."""
+    """The most frequent cells of failures, each with an example."""
     rows = []
     settings = any(one.cell.setting for one in found)
     for one in found[:SHOWN]:

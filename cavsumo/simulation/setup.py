@@ -17,7 +17,7 @@ from cavsumo.sumo.world import World
 
 @dataclass(frozen=True)
 class Setup:
-    """All that episodes of one scenario share.
+    """The objects that episodes of one scenario share.
 
     Attributes:
         scenario: what is simulated.
@@ -36,7 +36,7 @@ class Setup:
 
     @property
     def mission(self) -> Mission:
-        """What the ego may know beforehand."""
+        """The data that the ego has before its first episode."""
         site, route, horizon = self.site, self.site.route, self.scenario.end
         return Mission(site.net, route.edges, route.path, site.lights, self.world.dt, horizon)
 

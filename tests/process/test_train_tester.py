@@ -19,6 +19,7 @@ from cavsumo.results.statistics import Rate, rate
 
 EXAMPLE = ROOT / "examples" / "train_tester"
 TESTER = EXAMPLE / "tester.npz"
+pytestmark = pytest.mark.usefixtures("inline")
 
 
 def test_the_trained_tester_beats_the_random_one(
@@ -29,7 +30,7 @@ def test_the_trained_tester_beats_the_random_one(
     agent = f"policy:{TESTER.relative_to(ROOT)}"
     words = ["--agent", agent, "--agent", "random", "--runs", "40", "--seed", "7"]
     output = ["-o", str(tmp_path / "results.csv"), "--trace", "none", "-q", "--exit-zero"]
-    assert main(["run", "-n", "networks/crossing.net.xml", *words, *output, "-j", "2"]) == 0
+    assert main(["run", "-n", "networks/crossing.net.xml", *words, *output]) == 0
 
     def found(name: str) -> Rate:
         mine = [row for row in rows(tmp_path / "results.csv") if row["agent"] == name]

@@ -1,7 +1,7 @@
-"""Temporal-logic formulas over named signals: their text, their meaning, what they speak of.
+"""Temporal-logic formulas over named signals: syntax, semantics, signals.
 
-Nothing in here knows of assertions; ``assertions.formula`` watches episodes by them. To read a
-formula imports nothing heavy.
+Independent of assertions; ``assertions.formula`` evaluates them on episodes. To read a formula
+imports nothing heavy.
 """
 
 from typing import TYPE_CHECKING

@@ -1,4 +1,4 @@
-"""``cavsumo certify``: a test over fresh seeds and a list of egos, and what that proves."""
+"""``cavsumo certify``: a test on fresh seeds against a list of egos, with proven bounds."""
 
 from __future__ import annotations
 
@@ -39,6 +39,7 @@ from cavsumo.model.labels import cast_of, labelled
 from cavsumo.model.scenario import BatchPlan
 from cavsumo.model.seeds import starts_generator
 from cavsumo.model.study import Part, product
+from cavsumo.network.recorded_starts import recorded_start
 from cavsumo.results.recorded_plan import recorded_plan
 
 FORMAT = 1  # of the JSON; raised when a key changes its meaning or goes
@@ -46,7 +47,7 @@ WIDTH = 120
 
 
 def certify(order: CertifyOptions) -> int:
-    """Play the test and say what holds; everything is checked before anything is written."""
+    """Play the test and print the bounds; all checks precede the first written file."""
     means = Means(order.jobs)
     plan, manifest = recorded_plan(order.results)
     egos = opponents(order.egos, order.ego_param, plan.scenario)
@@ -82,12 +83,15 @@ def certify(order: CertifyOptions) -> int:
 def _check_batches(
     order: CertifyOptions, batches: Sequence[CheckedBatch], subject: Subject, record: Record | None
 ) -> None:
-    """Refuse to write over what is read, and starts that another ego would change."""
+    """Refuse to overwrite the results that are read, and starts that another ego would change."""
     read = {file.resolve() for file in (order.results, *order.apart)}
     for batch in batches:
         if batch.output.resolve() in read:
             raise InputError(f"output {str(batch.output)!r}: is one of the results")
-    if record is None or subject.starts_seed is None:
+    for batch in batches if subject.told else ():
+        for start in subject.told:
+            recorded_start(batch.prepared.site, start)
+    if record is None or subject.starts_seed is None or subject.told:
         return
     seed, ours = subject.starts_seed, subject.starts
     if ours is None:
@@ -101,7 +105,7 @@ def _check_batches(
 
 
 def _drawn(prepared: PreparedBatch, seed: int) -> list[tuple[float, float, float]]:
-    """Where testers start in a prepared batch."""
+    """The starts of testers in a prepared batch."""
     scenario = prepared.plan.scenario
     ego = make_ego(scenario.ego, scenario.ego_params).kind
     kinds = [kind_named(scenario.kind)] * scenario.testers
@@ -109,18 +113,18 @@ def _drawn(prepared: PreparedBatch, seed: int) -> list[tuple[float, float, float
     return [(start.x, start.y, start.o) for start in starts]
 
 
-# What is played
+# The batches
 
 
 def _allowed(order: CertifyOptions) -> frozenset[str] | None:
-    """The egos that the user named, None for whatever the results name."""
+    """The egos that the user named; None to allow those of the results."""
     return None if order.trust else frozenset(cast_of(order.egos).values())
 
 
 def _subject(
     order: CertifyOptions, plan: BatchPlan, manifest: Mapping[str, Any]
 ) -> tuple[Subject, Record | None]:
-    """The test, and the run that it comes from if it does."""
+    """The test, and its run if it has one."""
     if not order.test.isdecimal():
         return of_policy(order.test, plan, manifest, order.results, order.param), None
     record = recorded(order.results, int(order.test), _allowed(order))
@@ -146,7 +150,7 @@ def _marked(batch: CheckedBatch, order: CertifyOptions, subject: Subject) -> Che
 
 @contextlib.contextmanager
 def _output(order: CertifyOptions) -> Iterator[Path]:
-    """Where the results go; without a name for them to where they are soon gone."""
+    """The results file; in a temporary folder without ``-o``."""
     if order.output is not None:
         yield order.output
         return
@@ -164,7 +168,7 @@ def _warn(
     seeds: Used,
     subject: Subject,
 ) -> None:
-    """Say on stderr what a reader of the certificate should know."""
+    """Print warnings about the certificate on stderr."""
     for part, now in (("versions", prepared.versions), ("sha256", prepared.checksums)):
         was = manifest.get(part) or {}
         for name in sorted(was.keys() & now.keys()):
@@ -181,7 +185,7 @@ def _warn(
 
 
 def _first_lines(order: CertifyOptions, subject: Subject, seeds: Used, seed: int) -> str:
-    """What is certified, what is kept and what is drawn."""
+    """The first lines: the test, and the kept and drawn parts."""
     starts = "kept" if subject.starts_seed is not None else "drawn anew"
     files = ", ".join(map(str, seeds.results))
     return (

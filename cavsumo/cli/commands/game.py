@@ -36,7 +36,7 @@ EVERY_S = 10.0  # between lines of progress where there is no terminal
 
 
 def solve_file(order: SolveOptions) -> int:
-    """Solve the game in a file and say what was found."""
+    """Solve the game in a file and print the solution."""
     painters = _painters(order)
     try:
         with _progress(order.quiet) as tell, _stdout_kept():
@@ -65,7 +65,7 @@ def solve_file(order: SolveOptions) -> int:
 
 @contextmanager
 def _stdout_kept() -> Iterator[None]:
-    """Send to stderr what compiled libraries print: stdout has the result and nothing else."""
+    """Send the output of compiled libraries to stderr: stdout has only the result."""
     sys.stdout.flush()
     kept = os.dup(1)
     os.dup2(2, 1)
@@ -77,7 +77,7 @@ def _stdout_kept() -> Iterator[None]:
 
 
 def _status(order: SolveOptions, verdict: Solvability, solution: Solution | None) -> int:
-    """The exit status; says on stderr when the bounds are wider than asked for."""
+    """The exit status, with a note on stderr when the bounds are wider than the precision."""
     if solution is not None and not solution.precise:
         print(
             f"cavsumo: the bounds are {solution.width:.3g} apart, not {order.precision:g}: floats "
@@ -89,7 +89,7 @@ def _status(order: SolveOptions, verdict: Solvability, solution: Solution | None
 
 
 def _painters(order: SolveOptions) -> list[tuple[Any, Path]]:
-    """The functions that draw, with their files; InputError where that cannot be."""
+    """The functions that draw, with their files; InputError if that is impossible."""
     wanted = [("--picture", order.picture, "draw_tree")]
     wanted += [("--policy-picture", order.policy_picture, "draw_policy")]
     found = []
@@ -108,7 +108,7 @@ def _painters(order: SolveOptions) -> list[tuple[Any, Path]]:
 
 @contextmanager
 def _progress(quiet: bool) -> Iterator[Tell]:
-    """What is being done, on stderr: live on a terminal, now and then a line elsewhere."""
+    """The current step, on stderr: live on a terminal, a line at intervals elsewhere."""
     if quiet:
         yield lambda _, __: None
     elif sys.stderr.isatty():
@@ -123,7 +123,7 @@ def _progress(quiet: bool) -> Iterator[Tell]:
 
 @contextmanager
 def _lines() -> Iterator[Tell]:
-    """A line every EVERY_S with the seconds so far, also while one thing takes longer than that."""
+    """A line every EVERY_S with the seconds so far, also during a longer step."""
     begun, over, said = time.monotonic(), threading.Event(), "solving"
 
     def tell(doing: str, left: float) -> None:
@@ -144,7 +144,7 @@ def _lines() -> Iterator[Tell]:
 
 
 def _said(doing: str, left: float) -> str:
-    """What is being done, in words."""
+    """The current step, in words."""
     return f"solving: {doing}" + (f", residual {left:.1e}" if math.isfinite(left) else "")
 
 
@@ -176,7 +176,7 @@ def _json(order: SolveOptions, game: Game, verdict: Solvability, solution: Solut
 
 
 def _witness(verdict: Solvability) -> dict[str, Any] | None:
-    """The states that stand against a solution."""
+    """The states that make the game unsolvable."""
     if verdict.solvable:
         return None
     trap, cycle = verdict.trap, verdict.cycle
@@ -194,9 +194,9 @@ def _number(x: float) -> float | str:
 
 
 def _move(game: Game, solution: Solution, state: int) -> Any:
-    """What the tester plays in a state: an action, in B weights, in C a reply to each action.
+    """The tester's move in a state: an action, in B weights, in C a reply to each action.
 
-    None at goals and where no goal can be forced.
+    None at goals and in states from which no goal can be forced.
     """
     if game.goal[state] or not np.isfinite(solution.lower[state]):
         return None

@@ -47,7 +47,7 @@ ZEBRA_OPTIONS = (
 
 
 def import_osm(order: ImportOptions) -> int:
-    """Make the network; nothing is written unless all went well."""
+    """Make the network; files are written only after success."""
     box = None if order.bbox is None else parse_box(order.bbox)
     roads = find_roads(order.source, box)
     found = side(roads.hints, box or roads.bounds or (0, 0, 0, 0))
@@ -74,7 +74,7 @@ def import_osm(order: ImportOptions) -> int:
 
 
 def _about_side(found: Side, asked: bool | None) -> Iterator[str]:
-    """What to say of the side of the road that was asked for or is taken."""
+    """The note about the side of the road, chosen or derived."""
     if asked is not None or not found.certain:
         about = warning(found, bool(asked))
         if about is not None:
@@ -89,7 +89,7 @@ def _about_side(found: Side, asked: bool | None) -> Iterator[str]:
 
 
 def _options(order: ImportOptions, box: Box | None) -> list[str]:
-    """netconvert's options, apart from the type maps, whose place differs between machines."""
+    """netconvert's options without the type maps, whose path differs between machines."""
     left_out = {"tls.discard-simple"} if order.keep_pedestrian_signals else set()
     return [
         f"osm-files={EXTRACT}",
@@ -102,7 +102,7 @@ def _options(order: ImportOptions, box: Box | None) -> list[str]:
 
 
 def _zebra(folder: Path, time_limit_s: float) -> list[str]:
-    """Give the crossings without traffic lights priority; what netconvert says to it."""
+    """Give the crossings without traffic lights priority; returns netconvert's output."""
     network = read_network(folder / NET)
     crossings = [
         (
@@ -148,7 +148,7 @@ def _with_notice(network: str, order: ImportOptions, options: list[str]) -> str:
 
 
 def _publish(order: ImportOptions, network: str, log_text: str, log: Path) -> None:
-    """Put the network and its log in place, each as a whole."""
+    """Write the network and its log, each atomically."""
     data = network.encode("utf-8")
     if order.output.suffix == ".gz":
         data = gzip.compress(data, mtime=0)
@@ -165,7 +165,7 @@ def _publish(order: ImportOptions, network: str, log_text: str, log: Path) -> No
 
 
 def _write(file: Path, data: bytes) -> None:
-    """Replace a file as a whole: a reader sees the old one or the new one."""
+    """Replace a file atomically: a reader sees the old one or the new one."""
     part = file.with_name(f".{file.name}.part")
     try:
         part.write_bytes(data)
@@ -176,7 +176,7 @@ def _write(file: Path, data: bytes) -> None:
 
 
 def _what_was_made(output: Path, made: Facts) -> str:
-    """One line about the network, and what to do with it."""
+    """One line about the network, and the next commands."""
     name = shlex.quote(str(output))
     side = ", left-hand traffic" if made.left_hand else ""
     lights = f"{made.traffic_lights} traffic light{'' if made.traffic_lights == 1 else 's'}"

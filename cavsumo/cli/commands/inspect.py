@@ -1,4 +1,4 @@
-"""``cavsumo inspect``: what a network offers a test, as a table, as JSON, as a picture."""
+"""``cavsumo inspect``: a network described for tests, as a table, as JSON, as a picture."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ WIDTH = 120
 
 
 def inspect(look: InspectOptions) -> int:
-    """Look at a network and say what is there."""
+    """Describe a network."""
     draw = _drawing(look.picture)
     with SlowSteps(quiet=draw is None) as steps:
         found, here, junctions = _seen(look, steps)
@@ -53,7 +53,7 @@ def inspect(look: InspectOptions) -> int:
 
 
 def _seen(look: InspectOptions, steps: SlowSteps) -> tuple[Facts, InspectedNetwork, list[Junction]]:
-    """What there is to see of a network."""
+    """The facts and junctions of a network."""
     steps.begin(f"reading {look.net}")
     network = read_network(network_file(look.net))
     try:
@@ -66,7 +66,7 @@ def _seen(look: InspectOptions, steps: SlowSteps) -> tuple[Facts, InspectedNetwo
 
 
 def _note_unwritten(names: Sequence[str]) -> None:
-    """Say which names of streets are not in the picture."""
+    """Print the names of streets that are missing in the picture."""
     if names:
         said = _printable(", ".join(names))
         print(
@@ -77,14 +77,14 @@ def _note_unwritten(names: Sequence[str]) -> None:
 
 
 def _junctions(here: InspectedNetwork, look: InspectOptions) -> list[Junction]:
-    """The junction asked for, or the best."""
+    """The chosen junction, or the best ones."""
     if look.junction is not None:
         return [junction(here, here.network.junction(look.junction))]
     return best_junctions(here, look.top)
 
 
 def _drawing(picture: Path | None) -> Any:
-    """The function that draws, when a picture is wanted and possible; else InputError."""
+    """The function that draws, if a picture is requested; InputError if it is impossible."""
     if picture is None:
         return None
     try:
@@ -154,7 +154,7 @@ def _utf8() -> bool:
 
 
 def _print(text: str) -> None:
-    """Print on stdout, whatever letters it can write."""
+    """Print on stdout, with the letters that it can write."""
     print(_printable(text), end="")
 
 

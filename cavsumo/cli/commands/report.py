@@ -12,6 +12,6 @@ from cavsumo.report.order import ReportOptions
 
 
 def report(results: Sequence[Path], wanted: ReportOptions) -> int:
-    """Read, compute, and say it; nothing is written when anything is wrong."""
+    """Read, compute and print; no file is written after an error."""
     sys.stdout.write(write_report_files(results, wanted))
     return Exit.OK

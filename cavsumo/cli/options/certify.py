@@ -62,7 +62,7 @@ def _add_test(group: Any) -> None:
     add(
         "--open-loop",
         action="store_true",
-        help="of a run: its recorded actions, whatever happens, instead of its agent",
+        help="of a run: its recorded actions, in any situation, instead of its agent",
     )
     add(
         "--param",
@@ -117,7 +117,7 @@ def _add_output(group: Any) -> None:
         help="results file; FILE.csv becomes FILE-EGO.csv for each ego (default: none is kept)",
     )
     add("--resume", action="store_true", help="go on where the results end, or start")
-    add("--overwrite", action="store_true", help="start again in place of an unfinished batch")
+    add("--overwrite", action="store_true", help="start again in place of what is there")
     add("--json", dest="as_json", action="store_true", help="print JSON (docs/guide.md)")
     add("--exit-zero", action="store_true", help="a violation is no failure")
     add("-q", "--quiet", action="store_true", help="no progress")

@@ -11,7 +11,7 @@ from cavsumo.model.named_networks import names
 
 
 def net_help() -> str:
-    """How a network is named on the command line."""
+    """The help for a network on the command line."""
     return f"SUMO network (.net.xml, .net.xml.gz), or by name: {', '.join(names())}"
 
 

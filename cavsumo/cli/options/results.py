@@ -32,6 +32,12 @@ def add_replay(commands: Any) -> None:
         help="show what was recorded, without running it again: with other versions, say",
     )
     add(
+        "--playback",
+        action="store_true",
+        help="play its recorded actions and traffic back instead of asking its agent: from its "
+        "trace and the network, without routes",
+    )
+    add(
         "--trust",
         action="store_true",
         help="play it even if its ego or an assertion, named in the file, is a command to run, a "
@@ -91,7 +97,7 @@ def add_merge(commands: Any) -> None:
     )
     merge.add_argument("parts", nargs="+", type=Path, metavar="PART", help="the CSV of a shard")
     merge.add_argument("-o", "--output", required=True, type=Path, metavar="FILE")
-    merge.add_argument("--overwrite", action="store_true", help="in place of an unfinished batch")
+    merge.add_argument("--overwrite", action="store_true", help="in place of what is there")
     merge.add_argument("-q", "--quiet", action="store_true", help="no summary")
     merge.set_defaults(command=_merge)
 

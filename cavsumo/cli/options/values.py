@@ -9,4 +9,5 @@ from typing import Any
 
 def values_of(options: argparse.Namespace, record: Any) -> dict[str, Any]:
     """The options that are called as the fields of a record (a dataclass)."""
-    return {field.name: getattr(options, field.name) for field in dataclasses.fields(record)}
+    names = [field.name for field in dataclasses.fields(record) if field.name in options]
+    return {name: getattr(options, name) for name in names}

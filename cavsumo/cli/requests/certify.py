@@ -18,17 +18,17 @@ from cavsumo.results.recorded_plan import recorded_plan
 
 @dataclass(frozen=True)
 class CertifyOptions:
-    """What to certify, against whom, and how to show it.
+    """Options of the command.
 
     Attributes:
-        results, test: where the test comes from; a run's number or an agent.
-        starts: "kept" or "fresh"; None for what is usual.
+        results, test: the source of the test; a run's number or an agent.
+        starts: "kept" or "fresh"; None for the default.
         open_loop: the run's recorded actions instead of its agent.
         param: parameters of the agent in place of its own.
-        egos: as a command line names them.
+        egos: as on the command line.
         ego_param: their parameters, ``LABEL.KEY``.
-        trust: use egos and assertions from outside that only the results name.
-        runs, seed: episodes an ego, and where their seeds come from.
+        trust: use external egos and assertions that only the results name.
+        runs, seed: episodes per ego, and the seed from which theirs are drawn.
         apart: other results whose seeds are not to be used.
         confidence: of the bounds for all egos together.
         jobs: episodes at a time.

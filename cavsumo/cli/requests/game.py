@@ -12,13 +12,13 @@ from cavsumo.errors import InputError
 
 @dataclass(frozen=True)
 class SolveOptions:
-    """What to solve, and how to show it.
+    """Options of the command.
 
     Attributes:
         file: the game.
         reading: A, B or C.
-        precision: how far the bounds may be apart.
-        trim: solve what can be solved.
+        precision: largest distance of the bounds.
+        trim: solve the solvable part.
         as_json: as JSON instead of a table.
         picture: file to draw the game's tree into.
         policy_picture: file to draw the policy into.

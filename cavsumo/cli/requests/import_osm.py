@@ -15,17 +15,17 @@ ENDINGS = (".net.xml", ".net.xml.gz")
 
 @dataclass(frozen=True)
 class ImportOptions:
-    """What to import, and how.
+    """Options of the command.
 
     Attributes:
         source: the extract.
         output: the network to write.
-        bbox: west, south, east, north as written, or None for all of it.
-        left_hand: traffic keeps left; None for where the extract lies.
+        bbox: west, south, east, north as written, or None for the whole extract.
+        left_hand: traffic keeps left; None to decide by the extract.
         keep_pedestrian_signals: keep traffic lights that only stop cars for pedestrians.
         zebra: pedestrians have priority on crossings without traffic lights.
         overwrite: replace another network.
-        time_limit_s: how long netconvert may take [s].
+        time_limit_s: time limit of netconvert [s].
     """
 
     source: Path

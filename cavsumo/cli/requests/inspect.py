@@ -13,12 +13,12 @@ from cavsumo.network.network_file import root_of
 
 @dataclass(frozen=True)
 class InspectOptions:
-    """What to look at, and how to show it.
+    """Options of the command.
 
     Attributes:
         net: the network.
         junction: id of the only junction to show, None for the best.
-        top: how many junctions to show.
+        top: number of junctions to show.
         as_json: as JSON instead of a table.
         picture: file to draw the first junction into.
     """

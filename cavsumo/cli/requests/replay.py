@@ -14,12 +14,13 @@ TRACE = ".jsonl"  # how the name of a trace ends
 
 @dataclass(frozen=True)
 class ReplayOptions:
-    """What a replay is asked for.
+    """Options of the command.
 
     Attributes:
         run: number of the episode in results; None when a trace is given.
         net, routes: where the network and the routes are, if not where they were.
         recorded: take the trace as it is and play nothing.
+        playback: play its recorded actions and traffic instead of asking its agents.
         trust: play it even if that runs, imports or connects to what only the file names.
         html, fcd: files to write.
         gui: show it in sumo-gui, with so many milliseconds a timestep.
@@ -29,6 +30,7 @@ class ReplayOptions:
     net: Path | None = None
     routes: Path | None = None
     recorded: bool = False
+    playback: bool = False
     trust: bool = False
     html: Path | None = None
     fcd: Path | None = None
@@ -37,7 +39,7 @@ class ReplayOptions:
 
     @property
     def shown(self) -> bool:
-        """Whether the trace is of any use."""
+        """Whether the trace is needed."""
         return bool(self.html or self.fcd or self.gui)
 
 
