@@ -1,7 +1,6 @@
-"""What a command plans to play, refused before anything heavy is imported if it cannot be.
+"""Plans of the batches of a run: numbers, names and files, checked before heavy imports.
 
-Numbers, names and files are looked at here; what has to be built to be known, parameters and the
-site, is checked by ``preflight``.
+Parameters and the site, which are known only once they are built, are checked by ``preflight``.
 """
 
 from __future__ import annotations

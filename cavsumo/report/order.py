@@ -1,4 +1,4 @@
-"""What a report is asked for, checked before anything heavy is imported."""
+"""Options of a report, checked before heavy imports."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ class ReportOptions:
 
 
 def check_report(results: Sequence[Path], wanted: ReportOptions) -> None:
-    """Refuse what can be seen to be wrong at once."""
+    """Refuse wrong numbers and files."""
     for option in ("output", "junit", "html"):
         _check_output(f"--{option}", getattr(wanted, option), results)
     if wanted.replays < 0:

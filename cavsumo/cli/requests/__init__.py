@@ -1,1 +1,1 @@
-"""What each command is asked for: a record, and a check that refuses it before heavy imports."""
+"""Options of each command as a record, with a check before heavy imports."""

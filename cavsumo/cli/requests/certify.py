@@ -1,4 +1,4 @@
-"""The command certify: what it is asked for."""
+"""Options of the command certify, checked before heavy imports."""
 
 from __future__ import annotations
 
@@ -59,7 +59,7 @@ class CertifyOptions:
 
 
 def check_certify(order: CertifyOptions) -> None:
-    """Refuse what can be seen to be wrong at once: numbers, files, and names of egos and agents."""
+    """Refuse wrong numbers and files, and unknown egos and agents."""
     _check_numbers(order)
     Means(order.jobs)
     plan, _ = recorded_plan(order.results)

@@ -16,7 +16,7 @@ def check_folder(option: str, file: Path) -> None:
 
 
 def check_picture(option: str, file: Path | None) -> None:
-    """Refuse what cannot become a picture."""
+    """Refuse a file name that is not one of a picture."""
     if file is None:
         return
     if file.suffix.lower() not in PICTURES:

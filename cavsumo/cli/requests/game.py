@@ -1,4 +1,4 @@
-"""The command game: what it is asked for."""
+"""Options of the command game, checked before heavy imports."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ class SolveOptions:
 
 
 def check_solve(order: SolveOptions) -> None:
-    """Refuse what can be seen to be wrong at once."""
+    """Refuse wrong numbers, names and files."""
     if not (math.isfinite(order.precision) and order.precision > 0):
         raise InputError(f"--precision: expected a positive number, got {order.precision:g}")
     if order.time_limit is not None and not order.time_limit > 0:

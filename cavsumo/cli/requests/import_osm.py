@@ -1,4 +1,4 @@
-"""The command import-osm: what it is asked for."""
+"""Options of the command import-osm, checked before heavy imports."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ class ImportOptions:
 
 
 def check_import(order: ImportOptions) -> None:
-    """Refuse what cannot become a network file, before any work."""
+    """Refuse a path that cannot become a network file, and a wrong extract."""
     output = order.output
     if not output.name.endswith(ENDINGS) or output.name in ENDINGS:
         raise InputError(f"output {str(output)!r}: expected a name that ends in .net.xml")

@@ -1,4 +1,4 @@
-"""The command inspect: what it is asked for."""
+"""Options of the command inspect, checked before heavy imports."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ class InspectOptions:
 
 
 def check_inspect(look: InspectOptions) -> None:
-    """Refuse what can be seen to be wrong at once."""
+    """Refuse wrong numbers, names and files."""
     if look.top < 1:
         raise InputError(f"--top: expected at least 1, got {look.top}")
     check_picture("--picture", look.picture)

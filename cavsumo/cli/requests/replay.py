@@ -1,4 +1,4 @@
-"""The command replay: what it is asked for."""
+"""Options of the command replay, checked before heavy imports."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ class ReplayOptions:
 
 
 def check_replay(file: Path, wanted: ReplayOptions) -> None:
-    """Refuse what can be seen to be wrong at once."""
+    """Refuse wrong numbers, names and files."""
     for option, output in (("--html", wanted.html), ("--fcd", wanted.fcd)):
         if output is not None:
             check_folder(option, output)
