@@ -12,16 +12,18 @@ from typing import TYPE_CHECKING, Any
 
 from cavsumo.api.display import ResultsSummary, results_html, results_text
 from cavsumo.api.episodes import RecordedEpisode, as_recorded, played_again
-from cavsumo.batch.replay import located, recorded_plan
+from cavsumo.batch.replay import located
 from cavsumo.batch.replay import recorded as find_recorded
 from cavsumo.batch.tally import Tally
 from cavsumo.errors import InputError
 from cavsumo.model.objects import SentObject
 from cavsumo.model.own_folders import OwnFolder
 from cavsumo.model.scenario import BatchPlan, Scenario
-from cavsumo.report.files import ReportOptions, write_report_files
+from cavsumo.report.files import write_report_files
+from cavsumo.report.order import ReportOptions
 from cavsumo.results.columns import COLUMNS
 from cavsumo.results.reading import COMPLETE, read_results, whole_lines
+from cavsumo.results.recorded_plan import recorded_plan
 
 if TYPE_CHECKING:
     import pandas

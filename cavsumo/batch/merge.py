@@ -9,12 +9,12 @@ from typing import Any
 
 from cavsumo.batch.preflight import check_kept
 from cavsumo.batch.prepared import OUTPUTS
-from cavsumo.batch.replay import recorded_plan
 from cavsumo.batch.summary import Ended
 from cavsumo.batch.tally import Tally
 from cavsumo.errors import ResultsError
 from cavsumo.results.provenance import differences
 from cavsumo.results.reading import ego_log_name, inside, whole_lines
+from cavsumo.results.recorded_plan import recorded_plan
 from cavsumo.results.rows import Outcome
 from cavsumo.results.writing import Recorder
 

@@ -6,9 +6,10 @@ from collections.abc import Callable, Sequence
 from concurrent.futures import Executor
 
 from cavsumo.batch.batch_run import BatchRun
-from cavsumo.batch.executors import Means, opened
+from cavsumo.batch.executors import opened
 from cavsumo.batch.interrupts import Interrupts
-from cavsumo.batch.preflight import CheckedBatch, Manner
+from cavsumo.batch.manner import Manner, Means
+from cavsumo.batch.preflight import CheckedBatch
 from cavsumo.batch.prepared import PreparedBatch
 from cavsumo.batch.stopping import looks_at_rows
 from cavsumo.batch.summary import Ended

@@ -7,9 +7,11 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from cavsumo.batch.executors import Means
+from cavsumo.batch.manner import Manner as Manner
+from cavsumo.batch.manner import Means
+from cavsumo.batch.planned import PlannedBatch, planned
 from cavsumo.batch.playing import played
-from cavsumo.batch.preflight import CheckedBatch, Manner, checked
+from cavsumo.batch.preflight import CheckedBatch, prepared_batches
 from cavsumo.batch.summary import Ended, summarise
 from cavsumo.egos import make_ego
 from cavsumo.errors import Exit
@@ -18,16 +20,16 @@ from cavsumo.model.study import Part
 
 def run(settings: Mapping[str, Any], output: Path, means: Means, manner: Manner) -> int:
     """Play a batch; all checks precede the first written file."""
-    return run_study([Part("", dict(settings))], output, means, manner)
+    return run_study(planned([Part("", dict(settings))], output, manner), means, manner)
 
 
-def run_study(parts: Sequence[Part], output: Path, means: Means, manner: Manner) -> int:
+def run_study(batches: Sequence[PlannedBatch], means: Means, manner: Manner) -> int:
     """Play one batch after another; all are checked before anything is written."""
-    batches = checked(parts, output, manner)
-    for batch in batches:
+    checked = prepared_batches(batches, manner)
+    for batch in checked:
         if batch.replaced:
             print(_replacement(batch), file=sys.stderr)
-    ended, interrupted = played(batches, means, manner, announce)
+    ended, interrupted = played(checked, means, manner, announce)
     if not manner.quiet:
         summarise(ended)
     return exit_status(ended, interrupted, manner.exit_zero)
