@@ -23,7 +23,7 @@ from cavsumo.report.pages.report.places import IMPACT, PASSED, Spot, maps, merge
 from cavsumo.report.pages.report.plots import Bar, ratios_plot, shares_plot, survival_plot
 from cavsumo.report.pages.report.scenes import scenes
 from cavsumo.report.pages.report.words import answers, certainty, excluded, headline
-from cavsumo.report.survival import kaplan_meier
+from cavsumo.results.kaplan_meier import kaplan_meier
 from cavsumo.results.reading import read_rows
 
 Page = Callable[..., str]

@@ -115,8 +115,7 @@ class BatchRun:
     def end(self) -> None:
         """Complete the manifest."""
         self._note_outputs()
-        facts = {"episodes": self.tally.rows, "counts": self.tally.all.outcomes}
-        self.recorder.finish(self.status, facts | self._lessons.facts())
+        self.recorder.finish(self.status, self.tally.facts() | self._lessons.facts())
 
     def _note_outputs(self) -> bool:
         """Note in the manifest which files the ego has written; whether there are new ones."""

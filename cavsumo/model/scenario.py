@@ -196,13 +196,17 @@ class BatchPlan(BaseModel):
         "human", description="the driver who might have avoided a violation"
     )
     shard: str | None = Field(None, description="part I/N of the episodes, I from 1 to N")
-    first: bool = Field(False, description="stop at the first failure")
+    first: bool = Field(
+        False, description="stop at the first failure, of those judged the first preventable one"
+    )
     until_tests: int | None = Field(None, ge=1, description="stop after so many tests")
     until_half_width: str | None = Field(
         None, description="stop when the rate's interval is that narrow: 0.02, or 10% of the rate"
     )
-    until_rate: Literal["tests", "failures"] = Field(
-        "tests", description="the rate meant: tests among episodes, or failures among tests"
+    until_rate: Literal["tests", "preventable", "failures"] = Field(
+        "tests",
+        description="the rate meant: tests among episodes, preventable failures or all failures "
+        "among tests",
     )
     budget_s: Finite | None = Field(None, gt=0, description="stop after so much real time [s]")
 
@@ -223,6 +227,13 @@ class BatchPlan(BaseModel):
     def _well_formed(cls, value: str | None, info: ValidationInfo) -> str | None:
         if value is not None:
             part_of(value) if info.field_name == "shard" else half_width(value)
+        return value
+
+    @field_validator("until_rate")
+    @classmethod
+    def _judged(cls, value: str, info: ValidationInfo) -> str:
+        if value == "preventable" and info.data.get("reference") == "none":
+            raise ValueError("preventable needs a reference driver, and reference is none")
         return value
 
     @field_validator("agents")

@@ -10,7 +10,6 @@ import pandas
 
 from cavsumo.report.grouping import Group
 from cavsumo.report.pairs import (
-    Interval,
     Pairs,
     holm,
     mcnemar,
@@ -19,6 +18,7 @@ from cavsumo.report.pairs import (
     sequential_mcnemar,
     sequential_ratio_interval,
 )
+from cavsumo.results.statistics import Interval
 
 # What is compared: of a valid episode, whether it was a test, and whether the ego failed.
 EVENTS: dict[str, Callable[[pandas.DataFrame], pandas.Series]] = {

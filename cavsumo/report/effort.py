@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from cavsumo.report.compare import EVENTS
 from cavsumo.report.grouping import Group, Told
-from cavsumo.report.pairs import Interval
+from cavsumo.results.statistics import Interval
 
 
 @dataclass(frozen=True)

@@ -10,7 +10,8 @@ from typing import Any
 
 import pandas
 
-from cavsumo.batch.summary import event, interval, percent
+from cavsumo.batch.sentences import event
+from cavsumo.batch.summary import interval, percent
 from cavsumo.report.grouping import Group
 from cavsumo.report.load import Batch, Evidence
 from cavsumo.report.rates import Rates, rates

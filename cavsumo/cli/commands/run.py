@@ -9,13 +9,16 @@ from pathlib import Path
 from typing import Any
 
 from cavsumo.agents.casting import make_agents
+from cavsumo.batch import sentences
 from cavsumo.batch.batch_run import BatchRun
+from cavsumo.batch.ended import Ended
 from cavsumo.batch.executors import Means, opened
 from cavsumo.batch.interrupts import Interrupts
 from cavsumo.batch.preflight import CheckedBatch, Manner, checked
 from cavsumo.batch.prepared import PreparedBatch
 from cavsumo.batch.stopping import looks_at_rows
-from cavsumo.batch.summary import Ended, summarise
+from cavsumo.batch.summary import summarise
+from cavsumo.batch.tally import found_by
 from cavsumo.batch.worker import try_out
 from cavsumo.egos import make_ego
 from cavsumo.egos.ego_files import OutputWatch
@@ -32,9 +35,12 @@ def run(settings: Mapping[str, Any], output: Path, means: Means, manner: Manner)
 def run_study(parts: Sequence[Part], output: Path, means: Means, manner: Manner) -> int:
     """Play one batch after another; all are checked before anything is written."""
     ended, interrupted = played(checked(parts, output, manner), means, manner)
+    status = exit_status(ended, interrupted, manner.exit_zero)
     if not manner.quiet:
         summarise(ended)
-    return exit_status(ended, interrupted, manner.exit_zero)
+        if status == Exit.VIOLATED:
+            print(f"cavsumo: exit status {status:d}: {_reason(ended)}", file=sys.stderr)
+    return status
 
 
 def played(
@@ -91,6 +97,7 @@ def _play(
         batch.output,
         batch_run.tally,
         recorder.traces,
+        prepared.plan.reference,
         sequential=looks_at_rows(prepared.plan),
         shared=prepared.plan.reset == "shared",
         cut_short=batch_run.cut_short or batch_run.status == "interrupted",
@@ -112,7 +119,11 @@ def _carry_out(batch_run: BatchRun, manner: Manner) -> None:
 
 
 def exit_status(ended: Sequence[Ended], interrupted: bool, exit_zero: bool) -> int:
-    """130 interrupted, 3 an episode could not be run, 1 the ego violated an assertion, else 0."""
+    """130 interrupted, 3 an episode could not be run, 1 the ego violated an assertion, else 0.
+
+    It is 1 whether that was preventable or not: what the ego did is known, what another driver
+    would have done is a judgement.
+    """
     if interrupted:
         return Exit.INTERRUPTED
     found = [one.tally.all for one in ended]
@@ -120,6 +131,12 @@ def exit_status(ended: Sequence[Ended], interrupted: bool, exit_zero: bool) -> i
         return Exit.NOT_RUN
     violated = any(one.failures for one in found)
     return Exit.VIOLATED if violated and not exit_zero else Exit.OK
+
+
+def _reason(ended: Sequence[Ended]) -> str:
+    """What exit status 1 stands for, the preventable failures first."""
+    judged = all(one.judged for one in ended)
+    return sentences.exit_reason(found_by(one.tally.all for one in ended), judged)
 
 
 def _first_line(batch: CheckedBatch, jobs: int) -> str:

@@ -55,7 +55,11 @@ def add_run(commands: Any) -> None:
     output.add_argument(
         "--overwrite", action="store_true", help="start again in place of an unfinished batch"
     )
-    output.add_argument("--exit-zero", action="store_true", help="a violation is no failure")
+    output.add_argument(
+        "--exit-zero",
+        action="store_true",
+        help="exit with 0 whatever the ego did",
+    )
     output.add_argument("-q", "--quiet", action="store_true", help="no progress, no summary")
     run.set_defaults(command=_run)
 
@@ -71,14 +75,16 @@ def _add_means(group: Any) -> None:
 def _add_stopping(group: Any) -> None:
     add = group.add_argument
     switch = argparse.BooleanOptionalAction
-    add("-x", "--first", action=switch, default=None, help="stop at the first failure")
+    first = "stop at the first failure (with a reference driver: the first preventable one)"
+    add("-x", "--first", action=switch, default=None, help=first)
     add("--until-tests", type=int, metavar="N", help="stop after N tests")
     add(
         "--until-half-width",
         metavar="H",
         help="stop when every agent's rate is known to H, such as 0.02, or 10%% of the rate",
     )
-    add("--until-rate", choices=("tests", "failures"), help="the rate meant (default tests)")
+    rates = ("tests", "preventable", "failures")
+    add("--until-rate", choices=rates, help="the rate meant (default tests)")
     add("--budget", type=float, metavar="S", help="stop after S seconds of real time")
 
 

@@ -29,8 +29,8 @@ from cavsumo.report.pages.report.plots import (
 from cavsumo.report.pages.report.scenes import BatchPlace, scenes
 from cavsumo.report.pages.shell import render, write
 from cavsumo.report.rates import Share
-from cavsumo.report.survival import Curve
 from cavsumo.report.tables import tables
+from cavsumo.results.kaplan_meier import Curve
 
 FILES = Path(__file__).parent
 LINES = 30  # of a plot; the tables have all
