@@ -12,7 +12,7 @@ from typing import Any
 
 import pytest
 from shapely.geometry import LineString, box
-from support import CHROMIUM, LAPTOP, OPTIONS
+from support import CHROMIUM, LAPTOP, OPTIONS, ROOT, prepared_at
 
 from cavsumo.agents.base import Scene
 from cavsumo.batch.episode_runner import EpisodeRunner
@@ -28,11 +28,9 @@ from cavsumo.model.polyline import Path as Polyline
 from cavsumo.model.scenario import BatchPlan, plan_from
 from cavsumo.model.snapshot import BodyState, Snapshot
 from cavsumo.network.site import Site
-from cavsumo.results.provenance import checksums, versions
 from cavsumo.results.traces import Trace, parsed
 from cavsumo.sumo.world import World
 
-ROOT = Path(__file__).parents[1]
 NAMES = ("crossing", "junction", "pedestrians")
 
 # The straight road of networks/pedestrians.net.xml, in metres.
@@ -92,8 +90,7 @@ def set_up(staged: Callable[..., tuple[BatchPlan, Site]]) -> Callable[..., Prepa
     """Call like ``staged`` for all that a process needs to play."""
 
     def made(name: str = "pedestrians", **settings: Any) -> PreparedBatch:
-        plan, site = staged(name, **settings)
-        return PreparedBatch(plan, site, str(Path.cwd()), checksums(plan), versions())
+        return prepared_at(*staged(name, **settings))
 
     return made
 
@@ -235,7 +232,7 @@ def _start(x: float, y: float, o: float, open_plane: bool) -> Start:
 def shown(staged: Callable[..., tuple[BatchPlan, Site]]) -> tuple[Record, Trace, Site]:
     """An episode at the Helsinki crossing in which the ego hits a tester, recorded."""
     plan, site = staged("crossing", agents=["timing"], routes="auto")
-    with EpisodeRunner(plan, site) as runner:
+    with EpisodeRunner(prepared_at(plan, site)) as runner:
         outcome, _ = runner.play(dataclasses.replace(job(plan, 1), record=True))
     trace = parsed(outcome.trace)
     return Record(plan, trace.row, trace, trace.head, Path("results.csv")), trace, site

@@ -1,6 +1,6 @@
 """Tester agents: the protocol (``base``), the registry, one file an algorithm.
 
-``casting`` builds the agents of a batch, ``planning`` holds the games that some of them play.
+``casting`` resolves the agents of a batch, ``planning`` holds the games that some of them play.
 Importing this package registers the agents that come with cavsumo. Agents see snapshots only:
 no SUMO, no assertions. To add one: a file here, its name in the import below.
 """

@@ -41,15 +41,20 @@ class Agent:
             from its bodies. Set False where it does not: when nobody in an episode does, bodies
             that are far from everybody are left out of the snapshots.
         drives: whether its bodies may be vehicles. Set False where it can only walk.
+        learns: whether episodes change what it knows: then they are played in sequence.
+        promise: against whom its forecasts hold; empty for agents that make none.
+        manoeuvre: the one manoeuvre that its vehicles are asked to do (``manoeuvres.MANOEUVRES``):
+            they start where it is possible; "auto" for whichever is possible where they start.
         FILES: its parameters that name files; their checksums are noted with the results.
     """
 
     PARAMETERS: ClassVar[Mapping[str, str]] = {}
     FILES: ClassVar[tuple[str, ...]] = ()
-    learns: bool = False  # whether episodes change what it knows: then they are played in sequence
+    learns: bool = False
     sees_background: bool = True
     drives: bool = True
-    promise: str = ""  # against whom its forecasts hold; empty for agents that make none
+    promise: str = ""
+    manoeuvre: str = "auto"
 
     scene: Scene
     owned: tuple[int, ...]

@@ -22,7 +22,6 @@ from dataclasses import dataclass
 from itertools import groupby
 from typing import Any
 
-from cavsumo.agents.casting import learners
 from cavsumo.batch.jobs import Job, failed, job
 from cavsumo.batch.prepared import PreparedBatch
 from cavsumo.batch.worker import Answer, play
@@ -93,7 +92,7 @@ class _Line:
         self.prepared, self.executor, self.memories = prepared, executor, memories
         self._coming = self._grouped(todo)
         self.entries: deque[_Entry] = deque()
-        self._learners = learners(prepared.plan)
+        self._learners = prepared.cast.learners
 
     def join(self, ahead: int) -> None:
         """Take up episodes until so many are in line, and submit those that can start."""

@@ -3,19 +3,18 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from functools import cached_property
 from typing import Any
 
 from cavsumo.agents import Agent
-from cavsumo.agents.casting import make_agents
 from cavsumo.assertions.base import VIOLATED
 from cavsumo.batch.jobs import Job, finished
+from cavsumo.batch.prepared import PreparedBatch
 from cavsumo.egos.reference import REFERENCES
 from cavsumo.errors import CavsumoError, EgoError
-from cavsumo.model.scenario import BatchPlan, Simulation
+from cavsumo.model.scenario import Simulation
 from cavsumo.model.seeds import episode_seed
-from cavsumo.network.site import Site
 from cavsumo.results.columns import Row, row_of
 from cavsumo.results.rows import Outcome
 from cavsumo.results.traces import frame, origin, trace_head, trace_text
@@ -25,16 +24,11 @@ from cavsumo.simulation.setup import make_setup
 
 
 class EpisodeRunner:
-    """A plan set up in this process: plays jobs one after another; a context manager.
+    """A batch set up in this process: plays jobs one after another; a context manager."""
 
-    ``inputs``: the checksums of its files if they are known already.
-    """
-
-    def __init__(
-        self, plan: BatchPlan, site: Site, inputs: Mapping[str, str] | None = None
-    ) -> None:
-        self.plan, self._inputs = plan, inputs
-        self.setup = make_setup(plan.scenario, site)
+    def __init__(self, prepared: PreparedBatch) -> None:
+        self.prepared, self.plan = prepared, prepared.plan
+        self.setup = make_setup(prepared.plan.scenario, prepared.site)
         self._agents: dict[str, tuple[list[Agent], tuple[Any, ...] | None]] = {}
 
     def __enter__(self) -> EpisodeRunner:
@@ -46,7 +40,7 @@ class EpisodeRunner:
     @cached_property
     def _origin(self) -> dict[str, Any]:
         """What the traces of all episodes have in common."""
-        return origin(self.plan, self.setup.site, self._inputs)
+        return origin(self.plan, self.setup.site, self.prepared.checksums)
 
     def try_out(self, *, strict: bool = True) -> None:
         """Start the ego and SUMO once: what they refuse comes out before anything is written.
@@ -59,8 +53,8 @@ class EpisodeRunner:
         except EgoError:
             if strict:
                 raise
-        for label in self.plan.cast:
-            make_agents(self.plan, label)[0].prepare()
+        for member in self.prepared.cast:
+            self._team(member.label)[0][0].prepare()
         simulation: Simulation = "own" if self.plan.reset == "fresh" else "new"
         self.setup.world.reset(episode_seed(self.plan.seed, 0), (), (), simulation=simulation)
 
@@ -74,7 +68,7 @@ class EpisodeRunner:
         begun = time.perf_counter()
         log = ""
         try:
-            agents = self._cast(job)
+            agents = self.agents_of(job)
             before = _recall(agents)
             own = job.simulation == "own"
             record = job.record or (self.plan.trace != "none" and own)
@@ -98,12 +92,16 @@ class EpisodeRunner:
         said_later = self.setup.ego.take_log()  # of an episode that failed; a rerun's is not kept
         return Outcome(row, trace, log or said_later), memory
 
-    def _cast(self, job: Job) -> list[Agent]:
+    def _team(self, label: str) -> tuple[list[Agent], tuple[Any, ...] | None]:
+        """The agents of a label, and what they knew when they were built."""
+        if label not in self._agents:
+            agents = self.prepared.cast.agents(label)
+            self._agents[label] = agents, _recall(agents)
+        return self._agents[label]
+
+    def agents_of(self, job: Job) -> list[Agent]:
         """The agents of a job, with their memory."""
-        if job.agent not in self._agents:
-            agents = make_agents(self.plan, job.agent)
-            self._agents[job.agent] = agents, _recall(agents)
-        agents, unlearned = self._agents[job.agent]
+        agents, unlearned = self._team(job.agent)
         memories = unlearned if job.memory is None else job.memory
         for agent, memory in zip(agents, memories or (), strict=False):
             agent.remember(memory)

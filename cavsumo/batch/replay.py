@@ -9,7 +9,6 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from cavsumo.agents.casting import learners
 from cavsumo.batch.jobs import Job, job
 from cavsumo.batch.prepared import PreparedBatch, prepare
 from cavsumo.batch.trust import check_trust
@@ -208,7 +207,7 @@ def known(worker: Worker, run: int) -> tuple[Any, ...] | None:
     """What the agents of an episode knew before it; a learner lives through its earlier ones."""
     plan, memory = worker.prepared.plan, job(worker.prepared.plan, run).memory
     step = len(plan.agents)
-    learns = job(plan, run).agent in learners(plan)
+    learns = job(plan, run).agent in worker.prepared.cast.learners
     for earlier in range(run % step, run, step) if learns else ():
         _, memory = worker.play(job(plan, earlier, memory))
     return memory

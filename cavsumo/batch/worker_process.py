@@ -47,9 +47,7 @@ def _serve(pipe: Connection, prepared: PreparedBatch, strict: bool) -> None:
     with contextlib.ExitStack() as stack:
         try:
             prepared.check_here()
-            runner = stack.enter_context(
-                EpisodeRunner(prepared.plan, prepared.site, prepared.checksums)
-            )
+            runner = stack.enter_context(EpisodeRunner(prepared))
             runner.try_out(strict=strict)
         except (CavsumoError, OSError) as error:
             pipe.send(str(error))

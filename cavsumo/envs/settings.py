@@ -7,7 +7,6 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from cavsumo.agents.casting import learners
 from cavsumo.batch.prepared import PreparedBatch, prepare
 from cavsumo.egos import make_ego
 from cavsumo.egos.base import Ego
@@ -86,12 +85,13 @@ def prepared_for(
     plan = plan_from(settings | {"agents": (roles.agent or "noop",)}, source)
     if roles.actions == "targets" and plan.scenario.kind not in WALKING:
         raise InputError(f"{source}: actions 'targets' are for {' and '.join(WALKING)}s only")
-    if learners(plan):
+    prepared = prepare(plan, PuppetEgo(**roles.ego) if roles.ego is not None else None)
+    if prepared.cast.learners:
         raise InputError(
             f"{source}: agent {roles.agent} learns from episode to episode, so a seed would not "
             "make an episode; params={'learn': False} plays what was learned"
         )
-    return prepare(plan, PuppetEgo(**roles.ego) if roles.ego is not None else None)
+    return prepared
 
 
 def _refuse_what_is_learned(

@@ -20,7 +20,7 @@ It holds because the centre moves on a circle of radius (b / 2) / sin(beta): a c
 turn angle off the tangent, and the tangent is o + beta. The position uses the old speed v.
 
 The array functions check their input. `step_floats` and `steering_for_turn` serve one body in an
-inner loop, where NumPy costs ten times more: tests/test_kinematics.py holds the copies together.
+inner loop, where NumPy costs ten times more: tests/unit/test_kinematics.py compares the copies.
 """
 
 from __future__ import annotations

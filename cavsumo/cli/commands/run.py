@@ -8,7 +8,6 @@ from concurrent.futures import Executor
 from pathlib import Path
 from typing import Any
 
-from cavsumo.agents.casting import make_agents
 from cavsumo.batch import sentences
 from cavsumo.batch.batch_run import BatchRun
 from cavsumo.batch.ended import Ended
@@ -101,7 +100,7 @@ def _play(
         sequential=looks_at_rows(prepared.plan),
         shared=prepared.plan.reset == "shared",
         cut_short=batch_run.cut_short or batch_run.status == "interrupted",
-        promises={n: make_agents(prepared.plan, n)[0].promise for n in prepared.plan.cast},
+        promises={member.label: member.promise for member in prepared.cast},
     )
 
 
