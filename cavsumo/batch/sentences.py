@@ -20,9 +20,11 @@ def driver(reference: str) -> str:
 
 def failures(found: Found, judged: bool) -> str:
     """The failures that lead: the preventable ones, or all where nobody judged."""
-    if judged:
-        return many(found.preventable, "preventable failure")
-    return f"{found.failures} of them failed by the ego"
+    return (
+        many(found.preventable, "preventable failure")
+        if judged
+        else many(found.failures, "failure")
+    )
 
 
 def judgement(found: Found, reference: str) -> str:

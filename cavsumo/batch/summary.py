@@ -8,6 +8,7 @@ from collections.abc import Sequence
 from rich.console import Console
 from rich.measure import Measurement
 from rich.table import Table
+from rich.text import Text
 
 from cavsumo.agents.base import VERDICTS
 from cavsumo.assertions.base import HELD, INVALID, UNFAIR, VIOLATED
@@ -39,7 +40,7 @@ def summarise(ended: Sequence[Ended]) -> None:
     rows = sum(one.tally.rows for one in ended)
     tests, episodes = sentences.many(together.tests, "test"), sentences.many(rows, "episode")
     failed = sentences.failures(together, _judged(ended))
-    _say(console, f"\n{tests} in {episodes}, {failed}.  {_files(ended)}")
+    _say(console, f"\n{failed} in {tests}, {episodes}.  {_files(ended)}")
     _say_invalid(ended, console)
     for one in ended:
         _say_forecasts(one, console)
@@ -53,29 +54,39 @@ def summarise(ended: Sequence[Ended]) -> None:
 def _table(ended: Sequence[Ended]) -> Table:
     """One line an agent, of each batch."""
     several = any(one.name for one in ended)
-    table = Table(box=None, pad_edge=False, padding=(0, 2, 0, 0))
+    failures = PREVENTABLE if any(one.judged for one in ended) else "failures"
+    others = _others(ended)
     words = ["batch", "agent"] if several else ["agent"]
-    longest = [max(len(one.name) for one in ended)] if several else []
-    longest.append(max((len(name) for one in ended for name in one.tally.agents), default=0))
-    for title, length in zip(words, longest, strict=True):  # a path may be long
-        table.add_column(title, overflow="fold", min_width=max(len(title), min(WORD, length)))
-    shown = _shown(ended)
-    for title in ("runs", "tests", "rate", "95 % interval", *shown, "errors", "median to test"):
-        table.add_column(title, justify="right", no_wrap=True)
-    for one in ended:
-        for i, (agent, found) in enumerate(one.tally.agents.items()):
-            head = [one.name if i == 0 else "", agent] if several else [agent]
-            table.add_row(*head, *_cells(found, one.sequential, shown))
+    numbers = ["runs", failures, "of tests [95 %]", "tests", "rate [95 %]", *others, "errors"]
+    numbers.append("median to test")
+    rows = [
+        [one.name if i == 0 else "", agent][-len(words) :]
+        + _cells(found, one.sequential, failures, others)
+        for one in ended
+        for i, (agent, found) in enumerate(one.tally.agents.items())
+    ]
+    table = Table(box=None, pad_edge=False, padding=(0, 2, 0, 0))
+    for i, title in enumerate((*words, *numbers)):
+        longest = max(len(cell) for cell in (title, *(row[i] for row in rows)))
+        if i < len(words):  # a path may be long
+            table.add_column(Text(title), overflow="fold", min_width=min(WORD, longest))
+        else:
+            table.add_column(Text(title), justify="right", no_wrap=True, min_width=longest)
+    for row in rows:
+        table.add_row(*map(Text, row))
     return table
 
 
-def _shown(ended: Sequence[Ended]) -> list[str]:
-    """The columns of failures, preventable ones first, and of what is no test."""
+def _others(ended: Sequence[Ended]) -> list[str]:
+    """What is counted apart: other failures, and what is no test."""
     everything = found_by(one.tally.all for one in ended)
     judged = any(one.judged for one in ended)
-    failures = [PREVENTABLE, "of tests", UNPREVENTABLE] if judged else ["failures", "of tests"]
-    failures += [NOT_JUDGED] if judged and everything.not_judged else []
-    return [*failures, "unfair", *(["invalid"] if everything.invalid else [])]
+    return [
+        *([UNPREVENTABLE] if judged else []),
+        *([NOT_JUDGED] if judged and everything.not_judged else []),
+        "unfair",
+        *(["invalid"] if everything.invalid else []),
+    ]
 
 
 def _verdicts(ended: Sequence[Ended]) -> Table:
@@ -149,19 +160,17 @@ def _first(ended: Sequence[Ended], what: str) -> tuple[Row | None, str]:
     return None, ""
 
 
-def _cells(found: Found, sequential: bool, shown: Sequence[str]) -> list[str]:
-    """The cells of one agent; ``shown``: the columns between the tests and the errors."""
-    leading = PREVENTABLE if PREVENTABLE in shown else "failures"
-    tests, failures = (found.rate(r, sequential=sequential) for r in ("tests", leading))
-    counts = {title: str(getattr(found, title.replace(" ", "_"), "")) for title in shown}
-    counts["of tests"] = f"{percent(failures.value)} {interval(failures)}".strip()
+def _cells(found: Found, sequential: bool, failures: str, others: Sequence[str]) -> list[str]:
+    """The cells of one agent: the failures that lead, tests, and the columns of ``others``."""
+    tests, failed = (found.rate(r, sequential=sequential) for r in ("tests", failures))
     median = median_in_words(found.curve())
     return [
         str(found.episodes),
+        str(failed.count),
+        f"{percent(failed.value)} {interval(failed)}".strip(),
         str(found.tests),
-        percent(tests.value),
-        interval(tests),
-        *counts.values(),
+        f"{percent(tests.value)} {interval(tests)}".strip(),
+        *(str(getattr(found, name.replace(" ", "_"))) for name in others),
         str(found.errors),
         f"{median} s" if median else "",
     ]

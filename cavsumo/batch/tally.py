@@ -158,7 +158,7 @@ class Tally:
         """Count how the ego came along in a valid episode."""
         arrived, lost, frozen = (cell(row.get(c)) for c in ("arrived", "lost_s", "frozen"))
         if arrived:
-            found.arrivals[arrived == "1"] += 1
+            found.arrivals[float(arrived) == 1.0] += 1
         if lost:
             found.lost_s += float(lost)
             found.compared += 1
@@ -192,7 +192,7 @@ def found_by(agents: Iterable[Found]) -> Found:
     return together
 
 
-def tallied(rows: Iterable[Row]) -> Found:
+def tallied(rows: Iterable[Mapping[Any, Any]]) -> Found:
     """What some rows found, whoever their agents are."""
     tally = Tally()
     for row in rows:

@@ -20,11 +20,20 @@ from cavsumo.report.pairs import (
 )
 from cavsumo.results.statistics import Interval
 
-# What is compared: of a valid episode, whether it was a test, and whether the ego failed.
+# What is compared: of a valid episode, whether the ego failed preventably, failed at all, and
+# whether it was a test.
 EVENTS: dict[str, Callable[[pandas.DataFrame], pandas.Series]] = {
-    "tests": lambda rows: rows["outcome"].isin(("held", "violated")),
+    "preventable": lambda rows: (rows["outcome"] == "violated") & (rows["avoidable"] == 1),
     "failures": lambda rows: rows["outcome"] == "violated",
+    "tests": lambda rows: rows["outcome"].isin(("held", "violated")),
 }
+WORDS = {"preventable": "preventable failures"}  # for events, where the name alone is too short
+
+
+def events(groups: Sequence[Group]) -> tuple[str, str]:
+    """The events that a report leads with: failures, preventable ones if all were judged, tests."""
+    judged = all(group.reference for group in groups)
+    return ("preventable" if judged else "failures"), "tests"
 
 
 @dataclass(frozen=True)
@@ -35,7 +44,7 @@ class PairedComparison:
         setting: which setting, if there are several.
         first, second: who is compared: agents, or values of the column for one agent.
         agent: the agent that both are of; empty when agents are compared.
-        event: what is counted: tests or failures.
+        event: what is counted, one of ``EVENTS``.
         pairs: the pairs of valid episodes by what happened in them.
         ratio: the first's rate over the second's; infinite over none, None when neither has any.
         interval: its 95 % interval.
@@ -63,7 +72,7 @@ def comparisons(groups: Sequence[Group], by: str = "agent") -> list[PairedCompar
     """
     found = [
         _compared(later, earlier, event, by)
-        for event in EVENTS
+        for event in events(groups)
         for earlier, later in _comparable(groups, by)
     ]
     found = [comparison for comparison in found if comparison.pairs.total]

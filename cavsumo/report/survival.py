@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 import pandas
@@ -20,6 +21,13 @@ from cavsumo.results.kaplan_meier import (
 from cavsumo.results.statistics import Interval
 
 
+class RunOf(NamedTuple):
+    """An episode by its results file and its number there, as ``cavsumo replay`` takes them."""
+
+    file: str
+    run: int
+
+
 @dataclass(frozen=True)
 class TimeToTest(Told):
     """When tests come.
@@ -33,8 +41,7 @@ class TimeToTest(Told):
         mean, mean_interval: the mean time without a test up to the limit [s], normal interval; no
             interval without any test before the limit.
         limit: the time up to which the mean is taken [s], one for all groups.
-        first_test, first_failure: which of the group's valid episodes was the first, from 1; None
-            for none (that is, more than all of them).
+        first_preventable, first_test, first_failure: the first such run; None for none.
         curve: the whole estimate; None without episodes.
     """
 
@@ -45,8 +52,9 @@ class TimeToTest(Told):
     mean: float | None
     mean_interval: Interval | None
     limit: float | None
-    first_test: int | None
-    first_failure: int | None
+    first_preventable: RunOf | None
+    first_test: RunOf | None
+    first_failure: RunOf | None
     curve: Curve | None
 
 
@@ -81,12 +89,14 @@ def _estimate(group: Group, curve: Curve | None, limit: float | None) -> TimeToT
         mean=mean,
         mean_interval=near,
         limit=limit,
-        first_test=_first(EVENTS["tests"](valid)),
-        first_failure=_first(EVENTS["failures"](valid)),
+        first_preventable=_first(valid, "preventable"),
+        first_test=_first(valid, "tests"),
+        first_failure=_first(valid, "failures"),
         curve=curve,
     )
 
 
-def _first(happened: pandas.Series) -> int | None:
-    """The number of the first episode in which it happened, from 1."""
-    return int(happened.to_numpy().argmax()) + 1 if happened.any() else None
+def _first(valid: pandas.DataFrame, event: str) -> RunOf | None:
+    """The first episode in which it happened."""
+    found = valid[EVENTS[event](valid)]
+    return RunOf(found["file"].iloc[0], int(found["run"].iloc[0])) if len(found) else None
