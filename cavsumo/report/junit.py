@@ -103,8 +103,9 @@ def _failed(batch: Batch, failures: Sequence[Mapping[Any, Any]], tests: int) -> 
     if batch.plan.reference == "none":
         return f"{len(failures)} of {tests} tests failed"
     kinds = Counter(failure_kind(row) for row in failures)
-    said = f"{kinds[PREVENTABLE]} of {tests} tests failed, preventable by "
-    said += sentences.driver(batch.plan.reference)
+    preventable = sentences.many(kinds[PREVENTABLE], "failure")
+    by = sentences.driver(batch.plan.reference)
+    said = f"{preventable} of {tests} tests preventable by {by}"
     rest = ", ".join(f"{kinds[kind]} {kind}" for kind in ORDER[1:] if kinds[kind])
     return f"{said}; apart from that {rest}" if rest else said
 
