@@ -22,6 +22,7 @@ from chaos import children
 
 from cavsumo.batch.batch_run import BatchRun
 from cavsumo.batch.jobs import finished
+from cavsumo.batch.messages import Answer
 from cavsumo.batch.prepared import manifest, prepare
 from cavsumo.model.scenario import plan_from
 from cavsumo.results.columns import row_of
@@ -38,7 +39,7 @@ class Stubs(Executor):
         future: Future[Any] = Future()
         made = {"outcome": "held", "trigger_time_s": 1.0 + jobs[0].run % 97 / 10, "wall_s": 0.0}
         rows = [row_of(finished(prepared.plan, job)) | made for job in jobs]
-        future.set_result([(Outcome(row), None) for row in rows])
+        future.set_result([Answer(Outcome(row)) for row in rows])
         return future
 
 

@@ -91,7 +91,7 @@ def play(
 ) -> list[bool]:
     """Play jobs; which of them were tests."""
     begun = time.perf_counter()
-    rows = [runner.play(one)[0].row for one in jobs]
+    rows = [runner.play(one).outcome.row for one in jobs]
     spent[name] += time.perf_counter() - begun  # type: ignore[assignment]
     steps[name] += sum(row["steps"] for row in rows)
     return [is_test(row) for row in rows]

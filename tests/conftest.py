@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from inline import played_here
 from shapely.geometry import LineString, box
 from support import CHROMIUM, LAPTOP, OPTIONS, ROOT, prepared_at
 
@@ -46,6 +47,20 @@ def _own_cache(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
     with pytest.MonkeyPatch.context() as patched:
         patched.setenv("XDG_CACHE_HOME", str(tmp_path_factory.mktemp("cache")))
         yield
+
+
+@pytest.fixture(scope="module")
+def inline() -> Iterator[None]:
+    """Batches are played in this process."""
+    with played_here():
+        yield
+
+
+@pytest.fixture(scope="module", autouse=True)
+def _no_workers(request: pytest.FixtureRequest) -> None:
+    """Real workers play in tests/process only."""
+    if request.path.parent.name != "process":
+        request.getfixturevalue("inline")
 
 
 @pytest.fixture(scope="session")
@@ -233,7 +248,7 @@ def shown(staged: Callable[..., tuple[BatchPlan, Site]]) -> tuple[Record, Trace,
     """An episode at the Helsinki crossing in which the ego hits a tester, recorded."""
     plan, site = staged("crossing", agents=["timing"], routes="auto")
     with EpisodeRunner(prepared_at(plan, site)) as runner:
-        outcome, _ = runner.play(dataclasses.replace(job(plan, 1), record=True))
+        outcome = runner.play(dataclasses.replace(job(plan, 1), record=True)).outcome
     trace = parsed(outcome.trace)
     return Record(plan, trace.row, trace, trace.head, Path("results.csv")), trace, site
 
@@ -283,7 +298,6 @@ def found_failure(networks: dict[str, Path], tmp_path_factory: pytest.TempPathFa
     """The results of a small batch at the Helsinki crossing, with tests and failures."""
     file = tmp_path_factory.mktemp("found") / "found.csv"
     words = ["run", "-n", str(networks["crossing"]), "-o", str(file), "-q", "--exit-zero"]
-    assert (
-        main([*words, "--agent", "proximity", "--agent", "timing", "--runs", "8", "-j", "2"]) == 0
-    )
+    with played_here():
+        assert main([*words, "--agent", "proximity", "--agent", "timing", "--runs", "8"]) == 0
     return file

@@ -18,7 +18,7 @@ from cavsumo.batch.prepared import PreparedBatch
 from cavsumo.model.scenario import BatchPlan
 from cavsumo.network.site import Site
 from cavsumo.results.provenance import checksums, versions
-from cavsumo.results.reading import read_rows
+from cavsumo.results.reading import read_manifest, read_rows
 
 ROOT = Path(__file__).parents[1]  # the repository
 DATA = ROOT / "tests" / "data"
@@ -66,6 +66,19 @@ def content(folder: Path) -> dict[str, bytes]:
     """Every file of a folder with its bytes."""
     files = (file for file in folder.rglob("*") if file.is_file())
     return {str(file.relative_to(folder)): file.read_bytes() for file in files}
+
+
+def assert_same(file: Path, other: Path) -> None:
+    """Rows, traces and what was learned are those of another batch."""
+    assert rows(file) == rows(other)
+    assert traces(file) == traces(other)
+    for key in ("status", "episodes", "counts", "learned", "learned_after", "stopped_by"):
+        assert read_manifest(file)[key] == read_manifest(other)[key], key
+
+
+def untold(found: list[dict[str, str]]) -> list[dict[str, str]]:
+    """Rows without the names of their traces, which hold that of the results."""
+    return [row | {"trace": row["trace"].rpartition("/")[2]} for row in found]
 
 
 def until(happened: Callable[[], Any], what: str) -> None:

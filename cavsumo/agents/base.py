@@ -7,6 +7,7 @@ from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 
+from cavsumo.agents.names import AGENT_NAMES
 from cavsumo.model.bodies import NOOP, Action, Kind
 from cavsumo.model.registry import Registry
 from cavsumo.model.scene import Scene
@@ -114,7 +115,7 @@ class Agent:
         """Let the agents of one episode know of each other; called after their resets."""
 
 
-AGENTS: Registry[Agent] = Registry("agent")
+AGENTS: Registry[Agent] = Registry(AGENT_NAMES)
 
 
 @AGENTS.register("noop")

@@ -14,6 +14,8 @@ from cavsumo.agents.base import AGENTS, Agent
 from cavsumo.agents.policy import make_agent, parameters_of, policy_file
 from cavsumo.errors import InputError, UnknownName
 from cavsumo.model.bodies import Body, kind_named, model_of
+from cavsumo.model.objects import is_here, is_object
+from cavsumo.model.plugins import source_file
 from cavsumo.model.scenario import BatchPlan, Params, Scenario
 
 
@@ -23,9 +25,10 @@ class CastMember:
 
     Attributes:
         label: what the plan and the rows call it.
-        name: registered name, or ``policy:FILE``.
+        name: registered name, ``policy:FILE``, or the name of an object.
         params: its parameters, as given.
-        files: what it reads: the file of a policy, and the files that its parameters name.
+        files: what it is made of: the file of a policy or of an object's class, and the files that
+            its parameters name.
         learns: whether its episodes change what it knows for the next.
         drives, promise, manoeuvre: as the agent declares them (``Agent``).
     """
@@ -102,8 +105,8 @@ def resolve_cast(plan: BatchPlan) -> Cast:
 def _member(plan: BatchPlan, label: str, agent: Agent) -> CastMember:
     """An agent of a plan with the facts that one of it declares."""
     name, params = plan.cast[label], params_of(plan, label)
-    policy = policy_file(name)
-    files = [] if policy is None else [policy]
+    own = source_file(name) if is_object(name) else policy_file(name)
+    files = [] if own is None else [own]
     return CastMember(
         label,
         name,
@@ -124,11 +127,12 @@ def params_of(plan: BatchPlan, label: str) -> Params:
 def shown_manoeuvres(plan: BatchPlan) -> set[str]:
     """The manoeuvres that a plan's agents are asked for, without reading a policy's file.
 
-    An episode is shown where that file may be missing; what a policy does is in its file alone.
+    An episode is shown where that file may be missing; what a policy does is in its file alone. It
+    is also shown without an agent that was an object of another session.
     """
     return {
         Agent.manoeuvre
-        if policy_file(name) is not None
+        if policy_file(name) is not None or (is_object(name) and not is_here(name))
         else make_agent(name, params_of(plan, label)).manoeuvre
         for label, name in plan.cast.items()
     }

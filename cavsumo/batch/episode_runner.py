@@ -9,10 +9,12 @@ from typing import Any
 
 from cavsumo.agents import Agent
 from cavsumo.assertions.base import VIOLATED
-from cavsumo.batch.jobs import Job, finished
+from cavsumo.batch.jobs import Job, Memory, finished
+from cavsumo.batch.messages import Answer
 from cavsumo.batch.prepared import PreparedBatch
 from cavsumo.egos.reference import REFERENCES
 from cavsumo.errors import CavsumoError, EgoError
+from cavsumo.model.objects import is_instance
 from cavsumo.model.scenario import Simulation
 from cavsumo.model.seeds import episode_seed
 from cavsumo.results.columns import Row, row_of
@@ -29,7 +31,7 @@ class EpisodeRunner:
     def __init__(self, prepared: PreparedBatch) -> None:
         self.prepared, self.plan = prepared, prepared.plan
         self.setup = make_setup(prepared.plan.scenario, prepared.site)
-        self._agents: dict[str, tuple[list[Agent], tuple[Any, ...] | None]] = {}
+        self._agents: dict[str, tuple[list[Agent], Memory | None]] = {}
 
     def __enter__(self) -> EpisodeRunner:
         return self
@@ -58,13 +60,8 @@ class EpisodeRunner:
         simulation: Simulation = "own" if self.plan.reset == "fresh" else "new"
         self.setup.world.reset(episode_seed(self.plan.seed, 0), (), (), simulation=simulation)
 
-    def play(
-        self, job: Job, beat: Callable[[], None] = lambda: None
-    ) -> tuple[Outcome, tuple[Any, ...] | None]:
-        """Play a job: its outcome, and what the agents know afterwards if they learn.
-
-        ``beat`` is called whenever another simulation begins for it.
-        """
+    def play(self, job: Job, beat: Callable[[], None] = lambda: None) -> Answer:
+        """Play a job; ``beat`` is called whenever another simulation begins for it."""
         begun = time.perf_counter()
         log = ""
         try:
@@ -90,11 +87,14 @@ class EpisodeRunner:
             memory = job.memory
         row["wall_s"] = time.perf_counter() - begun
         said_later = self.setup.ego.take_log()  # of an episode that failed; a rerun's is not kept
-        return Outcome(row, trace, log or said_later), memory
+        return Answer(Outcome(row, trace, log or said_later), memory)
 
-    def _team(self, label: str) -> tuple[list[Agent], tuple[Any, ...] | None]:
-        """The agents of a label, and what they knew when they were built."""
-        if label not in self._agents:
+    def _team(self, label: str) -> tuple[list[Agent], Memory | None]:
+        """The agents of a label, and what they knew when they were built; fresh copies of one that
+        was given as an object.
+        """
+        member = self.prepared.cast[label]
+        if label not in self._agents or is_instance(member.name):
             agents = self.prepared.cast.agents(label)
             self._agents[label] = agents, _recall(agents)
         return self._agents[label]
@@ -115,7 +115,7 @@ class EpisodeRunner:
         return ""
 
 
-def _recall(agents: Sequence[Agent]) -> tuple[Any, ...] | None:
+def _recall(agents: Sequence[Agent]) -> Memory | None:
     """What the agents learned, None when none of them does."""
     memory = tuple(agent.recall() for agent in agents)
     return None if all(m is None for m in memory) else memory

@@ -19,6 +19,8 @@ if TYPE_CHECKING:
     from cavsumo.simulation.avoidability import Avoidability
     from cavsumo.simulation.loop import Episode
 
+Memory = tuple[Any, ...]  # what the agents of an episode know, as plain data, agent by agent
+
 
 @dataclass(frozen=True)
 class Job:
@@ -28,7 +30,7 @@ class Job:
         run: its number in the batch.
         agent: the tester agent's label.
         seed: the episode's seed.
-        memory: what the agents learned in earlier episodes, one entry an agent; None for none.
+        memory: what the agents learned in earlier episodes; None for nothing.
         record: keep the frames whatever happens.
         simulation: "own", or "new" to start one that later jobs share as the "same".
     """
@@ -36,12 +38,12 @@ class Job:
     run: int
     agent: str
     seed: int
-    memory: tuple[Any, ...] | None = None
+    memory: Memory | None = None
     record: bool = False
     simulation: Simulation = "own"
 
 
-def job(plan: BatchPlan, run: int, memory: tuple[Any, ...] | None = None) -> Job:
+def job(plan: BatchPlan, run: int, memory: Memory | None = None) -> Job:
     """The run-th episode of a batch: agents take turns, so run i stays what it is for any N.
 
     ``memory``: what earlier episodes taught, unless the plan says what is known in all of them.

@@ -55,10 +55,8 @@ class Lessons:
 
     def catch_up(self, executor: Executor) -> None:
         """Play the episodes whose lesson is owed."""
-        for outcome, memory in run_batch(
-            self._prepared, executor, self.owed, memories=self.memories
-        ):
-            self.learned(outcome.row, memory)
+        for answer in run_batch(self._prepared, executor, self.owed, memories=self.memories):
+            self.learned(answer.outcome.row, answer.memory)
         self.owed = []
 
     def known(self) -> tuple[dict[str, Any], dict[str, int]]:

@@ -5,9 +5,11 @@ from __future__ import annotations
 import dataclasses
 import hashlib
 import math
+import pickle
 import sys
 from collections.abc import Collection, Mapping, Set
 from dataclasses import dataclass, field
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
@@ -16,11 +18,13 @@ import numpy as np
 from cavsumo.agents.casting import Cast, resolve_cast
 from cavsumo.agents.manoeuvres import types_for
 from cavsumo.assertions import make_assertions
+from cavsumo.batch.plan_names import check_names
 from cavsumo.egos import make_ego
 from cavsumo.egos.base import Ego
 from cavsumo.egos.ego_files import data_files, machine
 from cavsumo.errors import InputError
 from cavsumo.model.bodies import WALKING, Kind, kind_named
+from cavsumo.model.objects import SentObject, objects_among
 from cavsumo.model.scenario import BatchPlan, Scenario
 from cavsumo.network.site import Site, Wishes, derive_site
 from cavsumo.network.traffic import Volume
@@ -42,6 +46,7 @@ class PreparedBatch:
         checksums: of the plan's files, so that a process elsewhere notices other ones.
         versions: of what the results depend on.
         machine: that on which it was prepared; files that an ego writes differ on others.
+        objects: the agents, the ego and the assertions that are objects of a Python session.
         key: stands for all of it.
     """
 
@@ -52,11 +57,20 @@ class PreparedBatch:
     checksums: Mapping[str, str]
     versions: Mapping[str, str]
     machine: str = field(default_factory=machine)
+    objects: tuple[SentObject, ...] = ()
     key: str = field(init=False)
 
     def __post_init__(self) -> None:
         facts = (self.plan.model_dump_json(), self.folder, self.checksums, self.versions)
         object.__setattr__(self, "key", hashlib.sha256(repr(facts).encode()).hexdigest())
+
+    @cached_property
+    def packed(self) -> bytes:
+        """The batch as every process gets it, pickled once for all of them."""
+        return pickle.dumps({f.name: getattr(self, f.name) for f in dataclasses.fields(self)})
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return _unpacked, (self.packed,)
 
     def check_here(self) -> None:
         """Raise InputError unless this process sees the same inputs and versions.
@@ -82,12 +96,20 @@ class PreparedBatch:
         return dataclasses.replace(self, checksums=kept)
 
 
+def _unpacked(packed: bytes) -> PreparedBatch:
+    """A batch that came from another process; it goes on to a third one as it came."""
+    batch = object.__new__(PreparedBatch)
+    batch.__dict__.update(pickle.loads(packed), packed=packed)
+    return batch
+
+
 def prepare(plan: BatchPlan, ego: Ego | None = None) -> PreparedBatch:
     """Check every name and parameter of a plan and derive its site; raises InputError.
 
     ``ego`` drives instead of the one that the plan names.
     """
     scenario = plan.scenario
+    check_names(plan)
     cast = resolve_cast(plan)
     for member in cast:
         member.make().prepare()
@@ -116,7 +138,8 @@ def prepare(plan: BatchPlan, ego: Ego | None = None) -> PreparedBatch:
         kinds, rng = [kind] * scenario.testers, np.random.default_rng(plan.seed)
         site.draw(kinds, ego.kind, scenario.start_speed, rng)
     inputs = checksums(scenario, cast.files)
-    return PreparedBatch(plan, cast, site, str(Path.cwd()), inputs, versions())
+    objects = objects_among([*plan.cast.values(), scenario.ego, *scenario.assertions])
+    return PreparedBatch(plan, cast, site, str(Path.cwd()), inputs, versions(), objects=objects)
 
 
 def wishes(plan: BatchPlan, kind: Kind, ego: Ego, manoeuvres: Set[str]) -> Wishes:

@@ -14,12 +14,13 @@ from cavsumo.envs.puppets import ACTIONS, PuppetEgo
 from cavsumo.errors import InputError, UnknownName
 from cavsumo.model.bodies import WALKING
 from cavsumo.model.checks import choice, whole
-from cavsumo.model.scenario import SCENARIO_KEYS, plan_from
+from cavsumo.model.scenario import plan_from
+from cavsumo.model.scenario.fields import settings as offered
 from cavsumo.model.scenario_file import read_config
 
 UNTIL = ("game", "verdict")
 PROCESSES = ("this", "own")
-KEYS = SCENARIO_KEYS | {"seed", "params"}  # of a scenario file, what matters to an environment
+KEYS = frozenset(s.key for s in offered() if s.environments)  # keywords of the environments
 
 
 @dataclass(frozen=True)

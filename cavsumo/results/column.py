@@ -45,12 +45,14 @@ class Column:
         meaning: what a cell says, and when it is empty.
         unit: of its numbers, empty for none.
         value: what the cell of a finished episode holds; None for nothing.
+        words: it holds words, not numbers.
     """
 
     name: str
     meaning: str
     unit: str
     value: Callable[[FinishedEpisode], Any]
+    words: bool = False
 
     @property
     def explanation(self) -> str:

@@ -104,20 +104,22 @@ _ALL = (
     Column(
         "run", "number of the episode in the batch, from 0; the key for replay", "", lambda f: f.run
     ),
-    Column("agent", "tester agent", "", lambda f: f.agent),
-    Column("ego", "vehicle under test", "", lambda f: f.plan.scenario.ego),
+    Column("agent", "tester agent", "", lambda f: f.agent, words=True),
+    Column("ego", "vehicle under test", "", lambda f: f.plan.scenario.ego, words=True),
     Column("testers", "number of tester bodies", "", lambda f: f.plan.scenario.testers),
     Column(
         "reset",
         "fresh: in a simulation of its own; shared: in one that other episodes used before",
         "",
         lambda f: "fresh" if f.fresh else "shared",
+        words=True,
     ),
     Column(
         "embodiment",
         "how SUMO was shown the testers: vehicle or person",
         "",
         lambda f: f.plan.scenario.embodiment,
+        words=True,
     ),
     Column(
         "sumo_width_m",
@@ -137,6 +139,7 @@ _ALL = (
         "agents that say nothing",
         "",
         _foretold(lambda said: said.verdict, ""),
+        words=True,
     ),
     Column(
         "forecast_value",
@@ -149,6 +152,7 @@ _ALL = (
         "violated, held, not_triggered, unfair, invalid or error",
         "",
         _judged(lambda said: said.verdict, unplayed="error"),
+        words=True,
     ),
     Column(
         "breach",
@@ -156,6 +160,7 @@ _ALL = (
         "makes the episode invalid, else the first",
         "",
         Measured(lambda episode: str(episode.breach or "")),
+        words=True,
     ),
     Column(
         "blame",
@@ -163,6 +168,7 @@ _ALL = (
         "law (docs/fairness.md); empty if no rule tells",
         "",
         Measured(lambda episode: episode.blame),
+        words=True,
     ),
     Column(
         "assertion",
@@ -170,12 +176,14 @@ _ALL = (
         "violated or alone",
         "",
         _judged(lambda said: said.assertion if said.triggered else ""),
+        words=True,
     ),
     Column(
         "verdicts",
         "what every assertion said: NAME=verdict, with blanks between",
         "",
         Measured(lambda episode: verdicts_cell(episode.verdicts)),
+        words=True,
     ),
     Column(
         "robustness",
@@ -184,7 +192,9 @@ _ALL = (
         "",
         _judged(_robustness),
     ),
-    Column("tester", "the tester's body involved", "", _judged(lambda said: said.tester)),
+    Column(
+        "tester", "the tester's body involved", "", _judged(lambda said: said.tester), words=True
+    ),
     Column(
         "trigger_time_s",
         "when the precondition triggered",
@@ -283,7 +293,13 @@ _ALL = (
         "",
         _retried(_avoidable),
     ),
-    Column("reference", "the reference driver", "", lambda f: f.avoidability and f.plan.reference),
+    Column(
+        "reference",
+        "the reference driver",
+        "",
+        lambda f: f.avoidability and f.plan.reference,
+        words=True,
+    ),
     Column(
         "last_chance_s",
         "latest time at which it could have perceived the risk and avoided it; empty for never",
@@ -301,6 +317,7 @@ _ALL = (
         "why it was not judged, or what to doubt",
         "",
         _retried(lambda found: found.note),
+        words=True,
     ),
     Column(
         "cost",
@@ -362,8 +379,8 @@ _ALL = (
         "",
         Measured(lambda episode: episode.teleports),
     ),
-    Column("trace", "frames, relative to this file", "", _later),
-    Column("error", "what went wrong when outcome is error", "", lambda f: f.error),
+    Column("trace", "frames, relative to this file", "", _later, words=True),
+    Column("error", "what went wrong when outcome is error", "", lambda f: f.error, words=True),
     Column("wall_s", "real time; the only column that is not reproducible", "s", _later),
 )
 

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import csv
 import io
-import json
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -30,11 +29,6 @@ class Outcome:
     row: Row
     trace: str = ""
     ego_log: str = ""
-
-    @property
-    def frames(self) -> list[dict[str, Any]]:
-        """The frames of the trace (parsed anew at each call)."""
-        return [json.loads(line) for line in self.trace.splitlines()[1:]]
 
 
 def cell(value: Any) -> str:

@@ -174,7 +174,7 @@ class EpisodeLoop:
             episode.steps, self.scene.dt
         )
         spoilt = self._validity.spoils(episode.judgement)
-        late = self.snapshot.time >= self._setup.horizon - 1e-9
+        late = self.snapshot.time >= self._setup.scenario.end - 1e-9
         arrived = True if self._arrived else False if late else None
         episode.progress = ego_progress(self.scene, self._history, arrived)
         episode.invalid, episode.breach = spoilt is not None, spoilt or self._validity.first
@@ -237,21 +237,22 @@ def _reset(
     """Draw the starts and begin an episode; one generator for each who draws."""
     streams = np.random.SeedSequence(seed)
     _, electing, *rest = map(np.random.default_rng, streams.spawn(2 + len(agents)))
-    placing = starts_generator(seed if setup.starts_seed is None else setup.starts_seed)
+    scenario = setup.scenario
+    placing = starts_generator(seed if scenario.starts_seed is None else scenario.starts_seed)
     kinds = [body.kind for body in setup.bodies]
     ego = setup.world.ego_body
-    starts = setup.site.draw(kinds, ego.kind, setup.start_speed, placing)
+    starts = setup.site.draw(kinds, ego.kind, scenario.start_speed, placing)
     watching: list[Ego | Agent | Assertion] = [setup.ego, *agents, *setup.assertions]
     # Vehicles keep their distance to whoever is ahead of them, so they see everybody.
     driving = any(start.approach for start in starts)
-    everything = record or driving or bool(setup.ego_sensor or setup.tester_sensor)
+    everything = record or driving or bool(scenario.ego_sensor or scenario.tester_sensor)
     everything = everything or any(who.sees_background for who in watching)
     snapshot = setup.world.reset(
         seed, _states(setup, starts), starts, everything=everything, simulation=simulation
     )
     starts, snapshot = _cleared(setup, starts, snapshot, placing)
     scene = setup.site.scene(setup.world.dt, ego, setup.bodies, starts, seed)
-    scene = dataclasses.replace(scene, horizon=setup.horizon)
+    scene = dataclasses.replace(scene, horizon=scenario.end)
     senses = _senses(setup, scene, streams)
     for agent, team, rng in zip(agents, setup.teams, rest, strict=True):
         agent.reset(scene, team, rng)
@@ -289,19 +290,22 @@ def _senses(setup: Setup, scene: Scene, streams: np.random.SeedSequence) -> Sens
 
     Their generators come after all others, which are the same with sensors and without.
     """
-    if not (setup.ego_sensor or setup.tester_sensor):
+    ego, testers = setup.scenario.ego_sensor, setup.scenario.tester_sensor
+    if not (ego or testers):
         return None
     seeds = streams.spawn(1 + len(setup.teams))
-    return Senses(scene, setup.ego_sensor, setup.tester_sensor, setup.teams, seeds)
+    return Senses(scene, ego, testers, setup.teams, seeds)
 
 
 def _states(setup: Setup, starts: Sequence[Start]) -> list[BodyState]:
     """The testers' first states."""
 
+    wanted = setup.scenario.start_speed
+
     def speed(kind: Kind, start: Start) -> float:
         if start.v is not None:
             return start.v
-        return kind.v_max if setup.start_speed is None else min(kind.v_max, setup.start_speed)
+        return kind.v_max if wanted is None else min(kind.v_max, wanted)
 
     return [
         BodyState(body, start.x, start.y, speed(body.kind, start), start.o)
@@ -368,7 +372,7 @@ def _over(setup: Setup, snapshot: Snapshot) -> bool:
             break
     else:
         return True
-    left = setup.horizon - snapshot.time
+    left = setup.scenario.end - snapshot.time
     if left > 1e-9:
         return False
     return left < -OVERTIME_S or not any(a.pending for a in setup.assertions)

@@ -12,11 +12,13 @@ import pytest
 from cavsumo.batch.dispatch import run_batch
 from cavsumo.batch.executors import local_executor
 from cavsumo.batch.jobs import job
+from cavsumo.batch.messages import Answer
 from cavsumo.batch.prepared import PreparedBatch
-from cavsumo.batch.worker import Answer, Worker
+from cavsumo.batch.worker import Worker
 from cavsumo.errors import InputError
 from cavsumo.model.seeds import episode_seed
 from cavsumo.results.rows import Outcome
+from cavsumo.results.traces import parsed
 
 SetUp = Callable[..., PreparedBatch]
 Row = dict[str, Any]
@@ -56,7 +58,12 @@ def answers(prepared: PreparedBatch, jobs: int = 1) -> list[Answer]:
 
 def played(prepared: PreparedBatch) -> list[Outcome]:
     """The outcomes of a batch."""
-    return [outcome for outcome, _ in answers(prepared)]
+    return [answer.outcome for answer in answers(prepared)]
+
+
+def frames(outcome: Outcome) -> list[Any]:
+    """The frames of an episode's trace."""
+    return list(parsed(outcome.trace).frames)
 
 
 def lasting(outcome: Outcome) -> Row:
@@ -97,7 +104,7 @@ def trial(set_up: SetUp, tmp_path_factory: pytest.TempPathFactory) -> Iterator[T
     with pytest.MonkeyPatch.context() as patch:
         patch.syspath_prepend(str(folder))
         outcomes = played(doomed())
-        start = outcomes[DOOMED].frames[0]["testers"]["tester0"][0]
+        start = frames(outcomes[DOOMED])[0]["testers"]["tester0"][0]
         yield Trial(doomed, [lasting(o) for o in outcomes], start)
 
 
@@ -149,8 +156,8 @@ def test_the_same_plan_twice_gives_the_same_rows_and_frames(
     """In another process, with other hash seeds and addresses: only the real time differs."""
     again = played(set_up("crossing", runs=2, **PAIR))
     assert [lasting(o) for o in again] == [lasting(o) for o in recorded]
-    assert repr([o.frames for o in again]) == repr([o.frames for o in recorded])
-    assert all(o.row["steps"] > 0 and o.frames[-1]["background"] for o in recorded)
+    assert repr([frames(o) for o in again]) == repr([frames(o) for o in recorded])
+    assert all(o.row["steps"] > 0 and frames(o)[-1]["background"] for o in recorded)
 
 
 def test_an_episode_is_the_same_in_any_batch_and_order(
@@ -160,9 +167,9 @@ def test_an_episode_is_the_same_in_any_batch_and_order(
     prepared = set_up("crossing", runs=5, **PAIR)
     with Worker(prepared) as worker:
         for run in (3, 0, 2, 1):
-            outcome, _ = worker.play(job(prepared.plan, run))
+            outcome = worker.play(job(prepared.plan, run)).outcome
             assert lasting(outcome) == lasting(recorded[run])
-            assert repr(outcome.frames) == repr(recorded[run].frames)
+            assert repr(frames(outcome)) == repr(frames(recorded[run]))
 
 
 def test_agents_compared_meet_the_same_starts(recorded: list[Outcome]) -> None:
@@ -170,10 +177,10 @@ def test_agents_compared_meet_the_same_starts(recorded: list[Outcome]) -> None:
     assert [o.row["agent"] for o in recorded] == ["random", "timing"] * 2
     for a, b in (recorded[:2], recorded[2:]):
         assert a.row["seed"] == b.row["seed"]
-        assert repr(a.frames[0]) == repr(b.frames[0])
-        assert repr(a.frames[-1]) != repr(b.frames[-1])
+        assert repr(frames(a)[0]) == repr(frames(b)[0])
+        assert repr(frames(a)[-1]) != repr(frames(b)[-1])
     assert recorded[0].row["seed"] == episode_seed(1, 0)
-    assert repr(recorded[0].frames[0]) != repr(recorded[2].frames[0])
+    assert repr(frames(recorded[0])[0]) != repr(frames(recorded[2])[0])
 
 
 # Learning
@@ -184,14 +191,16 @@ SCHOOL = {"runs": 3, "testers": 2, "trace": "none", "end": 15.0}
 @pytest.fixture(scope="module")
 def learned(set_up: SetUp) -> list[Any]:
     """What two Q-learning testers know after each of three episodes in one process."""
-    return [memory for _, memory in answers(set_up(agents=["q-learning"], **SCHOOL))]
+    return [answer.memory for answer in answers(set_up(agents=["q-learning"], **SCHOOL))]
 
 
 def test_learning_goes_on_in_the_next_process(set_up: SetUp, learned: list[Any]) -> None:
     """The weights are equal, whether one process played all episodes or another took over."""
     prepared = set_up(agents=["q-learning"], **SCHOOL)
     with Worker(prepared) as worker:
-        outcome, memory = worker.play(job(prepared.plan, 2, learned[1]))
+        answer = worker.play(job(prepared.plan, 2, learned[1]))
+    outcome, memory = answer.outcome, answer.memory
+    assert memory is not None
     assert outcome.row["outcome"] != "error"
     assert memory == learned[2]
     assert [m["episodes"] for m in memory] == [3, 3]
@@ -202,7 +211,7 @@ def test_learning_goes_on_in_the_next_process(set_up: SetUp, learned: list[Any])
 def test_a_death_loses_one_episode_and_not_the_training(trial: Trial) -> None:
     """The process dies in the third episode: the fourth goes on from what the second taught."""
     prepared = trial.set_up("q-learning", how="crash", doom=trial.doom)
-    memories = [memory for _, memory in answers(prepared)]
+    memories = [answer.memory for answer in answers(prepared)]
     assert [memory[0]["episodes"] for memory in memories] == [1, 2, 2, 3, 4]
     assert memories[DOOMED] == memories[DOOMED - 1]
     assert memories[DOOMED + 1] != memories[DOOMED]
@@ -211,6 +220,6 @@ def test_a_death_loses_one_episode_and_not_the_training(trial: Trial) -> None:
 def test_a_learner_learns_from_its_own_episodes_only(set_up: SetUp, learned: list[Any]) -> None:
     """Beside another agent it knows as much after each of its episodes as it does alone."""
     prepared = set_up(agents=["random", "q-learning"], **SCHOOL)
-    memories = [memory for _, memory in answers(prepared, jobs=2)]
+    memories = [answer.memory for answer in answers(prepared, jobs=2)]
     assert memories[1::2] == learned
     assert memories[0::2] == [None, None, None]

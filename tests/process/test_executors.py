@@ -16,7 +16,8 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from support import PATIENCE_S, rows, until
+from inline import played_here
+from support import PATIENCE_S, rows, until, untold
 
 from cavsumo.batch.dispatch import run_batch
 from cavsumo.batch.executors import Means, local_executor, opened
@@ -24,7 +25,7 @@ from cavsumo.batch.prepared import PreparedBatch, prepare
 from cavsumo.batch.worker import close_all
 from cavsumo.cli import main
 from cavsumo.errors import BatchError
-from cavsumo.model.scenario import plan_from
+from cavsumo.model.scenario import SHARED_BY, plan_from
 from cavsumo.results.reading import read_manifest
 from cavsumo.results.rows import Outcome
 
@@ -55,7 +56,7 @@ def quiet(prepared: PreparedBatch) -> list[Any]:
 def played(prepared: PreparedBatch, executor: Executor) -> list[Any]:
     """What comes out of an executor: rows, traces and what was learned, in order."""
     batch = run_batch(prepared, executor, prepared.plan.todo())
-    return [(lasting(outcome), memory) for outcome, memory in batch]
+    return [(lasting(answer.outcome), answer.memory) for answer in batch]
 
 
 def quiet_rows(quiet: list[Any], upto: int | None = None) -> list[tuple[str, str, str]]:
@@ -78,6 +79,24 @@ def test_two_at_a_time_play_what_one_plays(prepared: PreparedBatch, quiet: list[
     with opened(Means(jobs=2)) as (executor, jobs):
         assert jobs == 2
         assert played(prepared, executor) == quiet
+
+
+def test_episodes_that_share_a_simulation_do_not_depend_on_who_plays_them(
+    networks: dict[str, Path], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """In this process or two others, at once or resumed in the middle of a block: the same rows."""
+    monkeypatch.chdir(tmp_path)
+    words = ["run", "-n", str(networks["crossing"]), "--reset", "shared", "--testers", "1"]
+    words += ["--runs", str(SHARED_BY + 3), "--end", "6", "-q", "--exit-zero"]
+    with played_here():
+        assert main([*words, "-o", "alone.csv"]) == 0
+    assert main([*words, "-o", "two.csv", "-j", "2"]) == 0
+    alone, file = untold(rows(Path("alone.csv"))), Path("two.csv")
+    assert untold(rows(file)) == alone
+    lines = file.read_bytes().splitlines(keepends=True)
+    file.write_bytes(b"".join(lines[:12]))
+    assert main(["run", "--resume", "-q", "--exit-zero", "-o", "two.csv"]) == 0
+    assert untold(rows(file)) == alone
 
 
 def test_a_plain_thread_pool_will_do(prepared: PreparedBatch, quiet: list[Any]) -> None:

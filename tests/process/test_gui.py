@@ -15,7 +15,8 @@ from cavsumo.batch.replay import Record
 from cavsumo.cli import main
 from cavsumo.errors import Exit, InputError
 from cavsumo.interop import gui
-from cavsumo.interop.gui import check_gui, command, show
+from cavsumo.interop.gui import additional_file, check_gui, command, show
+from cavsumo.network.drawing.place import site_drawn
 from cavsumo.network.site import Site
 from cavsumo.results.traces import Trace
 
@@ -54,6 +55,26 @@ def test_a_trace_is_played_in_the_real_window(
     record, trace, site = shown
     some = Trace(trace.head, trace.frames[:5] + trace.frames[-2:])
     show(some, record.plan.scenario, site, 0.0, close=True)
+
+
+def test_sumo_is_given_the_route_that_everybody_draws(
+    shown: tuple[Record, Trace, Site], tmp_path: Path
+) -> None:
+    """As a polygon that SUMO takes, along the ego's path."""
+    _, trace, site = shown
+    file = tmp_path / "types.add.xml"
+    file.write_text(additional_file(trace, site_drawn(site)), encoding="utf-8")
+    libsumo = pytest.importorskip("libsumo")
+    libsumo.start(["sumo", "-n", str(site.net), "-a", str(file), "--no-step-log"])
+    try:
+        (route,) = libsumo.polygon.getIDList()
+        shape = libsumo.polygon.getShape(route)
+    finally:
+        libsumo.close()
+    ends = site.route.path.points[0], site.route.path.points[-1]
+    for (x, y), (at_x, at_y) in zip((shape[0], shape[-1]), ends, strict=True):
+        assert (x, y) == pytest.approx((at_x, at_y), abs=0.01)
+    assert all(abs(site.route.path.project(x, y).lateral) < 0.05 for x, y in shape)
 
 
 def test_without_a_display_it_says_so(

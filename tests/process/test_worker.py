@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import os
+import pickle
 import shutil
 import signal
 import tempfile
@@ -19,9 +20,9 @@ from support import PATIENCE_S, alive, until, workers_of
 
 from cavsumo.batch import worker_process
 from cavsumo.batch.jobs import job
+from cavsumo.batch.messages import Reply, Task
 from cavsumo.batch.prepared import PreparedBatch, prepare
 from cavsumo.batch.worker import Worker
-from cavsumo.batch.worker_process import GOODBYE
 from cavsumo.errors import BatchError, InputError
 from cavsumo.model.scenario import plan_from
 from cavsumo.results.rows import Outcome
@@ -76,7 +77,7 @@ def prepared(networks: dict[str, Path]) -> PreparedBatch:
 def quiet(prepared: PreparedBatch) -> list[dict[str, Any]]:
     """The rows of its batch, undisturbed."""
     with Worker(prepared) as worker:
-        return [lasting(worker.play(job(prepared.plan, run))[0]) for run in range(3)]
+        return [lasting(worker.play(job(prepared.plan, run)).outcome) for run in range(3)]
 
 
 @pytest.fixture(autouse=True)
@@ -87,6 +88,15 @@ def nobody_left() -> Iterator[None]:
     assert workers_of(os.getpid()) == before
 
 
+def test_a_batch_is_packed_once_for_all_its_processes(prepared: PreparedBatch) -> None:
+    """What came from another process goes on to a third one in the same bytes."""
+    here = pickle.loads(pickle.dumps(prepared))
+    assert (here.plan, here.cast) == (prepared.plan, prepared.cast)
+    assert here.key == prepared.key
+    assert here.packed == prepared.packed
+    assert dataclasses.replace(here, folder="elsewhere").packed != prepared.packed
+
+
 # Dying --------------------------------------------------------------------------------------------
 
 
@@ -95,12 +105,12 @@ def test_a_process_killed_while_it_waits_costs_one_row_at_most(
 ) -> None:
     """Nothing was under way: the next episode is played by another process, or is an error."""
     with Worker(prepared) as worker:
-        first, _ = worker.play(job(prepared.plan, 0))
+        first = worker.play(job(prepared.plan, 0)).outcome
         pid = only_child()
         os.kill(pid, signal.SIGKILL)
         until(lambda: not alive(pid), "it is dead")
-        second, _ = worker.play(job(prepared.plan, 1))
-        third, _ = worker.play(job(prepared.plan, 2))
+        second = worker.play(job(prepared.plan, 1)).outcome
+        third = worker.play(job(prepared.plan, 2)).outcome
         assert only_child() != pid
     assert lasting(first) == quiet[0]
     assert second.row["outcome"] == "error" or lasting(second) == quiet[1]
@@ -127,7 +137,7 @@ def test_a_process_that_dies_at_its_start_is_started_again(
     killer.start()
     with Worker(prepared) as worker:
         killer.join()
-        outcome, _ = worker.play(job(prepared.plan, 1))
+        outcome = worker.play(job(prepared.plan, 1)).outcome
         assert only_child() not in with_killed
     assert len(with_killed) == 2
     assert lasting(outcome) == quiet[1]
@@ -163,9 +173,9 @@ def test_a_process_that_stopped_is_an_error_and_is_replaced(
         worker.play(job(prepared.plan, 0))
         pid = only_child()
         os.kill(pid, signal.SIGSTOP)
-        second, _ = worker.play(job(prepared.plan, 1))
+        second = worker.play(job(prepared.plan, 1)).outcome
         assert not alive(pid)
-        third, _ = worker.play(job(prepared.plan, 2))
+        third = worker.play(job(prepared.plan, 2)).outcome
     assert second.row["outcome"] == "error"
     assert second.row["error"] == "no answer within 2 s, killed"
     assert second.row["wall_s"] >= 2.0
@@ -182,7 +192,7 @@ def test_closing_ends_an_episode_that_another_thread_waits_for(
 
     def play() -> None:
         try:
-            said.append(worker.play(job(held.plan, 0))[0].row["error"])
+            said.append(worker.play(job(held.plan, 0)).outcome.row["error"])
         except BatchError as error:
             said.append(str(error))
 
@@ -211,7 +221,7 @@ def test_the_children_of_a_controller_die_with_its_process(
     """A user's controller that starts a program of its own leaves none behind, hour after hour."""
     held = held_setting(prepared, controller(PARENT), tmp_path)
     with Worker(held) as worker:
-        outcome, _ = worker.play(job(held.plan, 0))
+        outcome = worker.play(job(held.plan, 0)).outcome
         assert outcome.row["outcome"] != "error", outcome.row["error"]
         first = int((tmp_path / "child").read_text())
         assert alive(first)
@@ -319,13 +329,13 @@ def test_a_process_with_nothing_to_do_says_goodbye(
     """It goes by itself after a while, so that dask workers and open sessions hold no SUMO."""
     monkeypatch.setattr(worker_process, "IDLE_S", 0.2)
     ours, theirs = Pipe()
-    serving = threading.Thread(target=worker_process._serve, args=(theirs, prepared, True))
+    serving = threading.Thread(target=worker_process._serve, args=(theirs, Task(prepared)))
     serving.start()
     try:
         assert ours.poll(PATIENCE_S)
-        assert ours.recv() is None
+        assert ours.recv() == Reply("ready")
         assert ours.poll(PATIENCE_S)
-        assert ours.recv() == GOODBYE
+        assert ours.recv() == Reply("goodbye")
     finally:
         ours.close()
         serving.join(PATIENCE_S)
@@ -361,5 +371,5 @@ def test_a_process_that_said_goodbye_is_replaced_without_loss(
         for run in range(3):
             pid = only_child() if run else None
             until(lambda p=pid: p is None or not alive(p), "it went by itself")
-            outcome, _ = worker.play(job(prepared.plan, run))
+            outcome = worker.play(job(prepared.plan, run)).outcome
             assert lasting(outcome) == quiet[run]

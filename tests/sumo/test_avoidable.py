@@ -420,11 +420,11 @@ def test_no_reference_leaves_the_rest_of_the_row_as_it_is(
     plan, site = staged("pedestrians", **{**BATCH, "reference": "none", "trace": trace})
     number = int(next(row for row in rows(batch) if row["avoidable"])["run"])
     with EpisodeRunner(prepared_at(plan, site)) as runner:
-        without = runner.play(job(plan, number))[0]
+        without = runner.play(job(plan, number)).outcome
     beats: list[int] = []
     plan = plan.model_copy(update={"reference": "ideal"})
     with EpisodeRunner(prepared_at(plan, site)) as runner:
-        with_it = runner.play(job(plan, number), lambda: beats.append(1))[0]
+        with_it = runner.play(job(plan, number), lambda: beats.append(1)).outcome
     for name in ("avoidable", "reference", "last_chance_s", "margin_s", "avoidable_note", "wall_s"):
         with_it.row.pop(name, None)
         without.row.pop(name, None)
@@ -475,7 +475,7 @@ def test_a_program_is_relieved_too(staged: Staged, tmp_path: Path) -> None:
     plan, site = staged("pedestrians", **{**BATCH, "ego": ego, "ego_params": {"depart_speed": 7}})
     with EpisodeRunner(prepared_at(plan, site)) as runner:
         runner.try_out()
-        outcome = runner.play(job(plan, 0))[0]
+        outcome = runner.play(job(plan, 0)).outcome
     assert outcome.row["outcome"] == "violated", outcome.row.get("error")
     assert (outcome.row["avoidable"], outcome.row["avoidable_note"]) == (1, "")
     assert outcome.ego_log.count("begun") == 1

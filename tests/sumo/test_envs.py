@@ -143,7 +143,7 @@ def test_a_tester_moved_from_outside_gives_the_row_of_a_batch(
     prepared = set_up("pedestrians", bodies_per_agent=3, trace="none", agents=("timing",), end=20.0)
     seed = 6
     with EpisodeRunner(prepared) as runner:
-        row = runner.play(Job(0, "timing", seed))[0].row
+        row = runner.play(Job(0, "timing", seed)).outcome.row
         noted = _tester_actions(runner, seed)
     env = make(until="verdict", end=20.0)
     env.reset(seed=seed)
@@ -189,7 +189,7 @@ def test_an_ego_driven_from_outside_gives_the_row_of_a_batch(
         return command
 
     with EpisodeRunner(prepared) as runner:
-        row = runner.play(Job(0, "proximity", seed))[0].row
+        row = runner.play(Job(0, "proximity", seed)).outcome.row
     ego.act = noting  # type: ignore[method-assign]
     setup = make_setup(prepared.plan.scenario, prepared.site, ego)
     loop = EpisodeLoop(setup, [AGENTS.make("proximity", {}) for _ in range(3)], seed)

@@ -55,7 +55,7 @@ def words(option: str, sensor: dict[str, Any]) -> list[str]:
 def outcomes(plan: BatchPlan, site: Site) -> list[str]:
     """Of a batch, played in this process; an error says what it was."""
     with EpisodeRunner(prepared_at(plan, site)) as runner:
-        found = [runner.play(job(plan, run))[0].row for run in range(plan.runs)]
+        found = [runner.play(job(plan, run)).outcome.row for run in range(plan.runs)]
     return [row.get("error") or row["outcome"] for row in found]
 
 

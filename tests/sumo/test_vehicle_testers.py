@@ -23,7 +23,7 @@ def outcomes(prepared: Any, times: int = 1) -> list[Outcome]:
     """What the episodes of a batch leave, in one process; several times over if wanted."""
     with Worker(prepared) as worker:
         todo = [run for _ in range(times) for run in prepared.plan.todo()]
-        return [worker.play(job(prepared.plan, run))[0] for run in todo]
+        return [worker.play(job(prepared.plan, run)).outcome for run in todo]
 
 
 def rows(prepared: Any, times: int = 1) -> list[dict[str, Any]]:

@@ -64,6 +64,7 @@ def test_a_cast_is_resolved_once_and_travels(
 ) -> None:
     """To prepare a batch builds an agent to be asked and one to be prepared, whatever reads it."""
     monkeypatch.setitem(AGENTS._entries, "counted", Counted)
+    monkeypatch.setattr(AGENTS.names, "_others", {"counted"})
     monkeypatch.setattr(Counted, "built", 0)
     prepared = prepare(planned(networks["pedestrians"], ["counted"], kind="car"))
     assert Counted.built == 2

@@ -30,7 +30,8 @@ ROOMS = {
         "batch": "model network agents assertions egos sumo simulation results",
         "report": "model network assertions egos results batch",
         "interop": "model network sumo results",
-        "envs": "model agents assertions egos simulation results batch",
+        "api": "model network batch report results",
+        "envs": "model network agents assertions egos simulation results batch",
         "testing": "model network agents assertions egos",
         "cli": "model games network agents assertions egos results batch report interop testing",
     }.items()
@@ -182,7 +183,7 @@ def test_the_command_line_starts_light() -> None:
 
 def test_the_process_that_waits_has_no_sumo() -> None:
     """SUMO may take its process down, so the parent, which keeps the results, never loads it."""
-    assert "libsumo" not in loaded_by("cavsumo.batch.batch_run, cavsumo.cli.commands.run")
+    assert "libsumo" not in loaded_by("cavsumo.batch.playing, cavsumo.cli.commands.run")
 
 
 def test_an_ego_is_checked_without_pytest() -> None:

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import importlib
 import inspect
+import re
+from pathlib import Path
 from typing import Any, ClassVar
 
 import pytest
@@ -10,11 +13,19 @@ import pytest
 from cavsumo.agents import AGENTS
 from cavsumo.assertions import ASSERTIONS
 from cavsumo.egos import EGOS
+from cavsumo.egos.reference import REFERENCES
 from cavsumo.errors import InputError, UnknownName
 from cavsumo.model.checks import number
+from cavsumo.model.names import Names
 from cavsumo.model.registry import Registry
 
 SHIPPED = [(r, name) for r in (AGENTS, EGOS, ASSERTIONS) for name in r]
+REGISTRIES: dict[str, Registry[Any]] = {
+    "AGENTS": AGENTS,
+    "EGOS": EGOS,
+    "ASSERTIONS": ASSERTIONS,
+    "REFERENCES": REFERENCES,
+}
 NAMES = [f"{r.sort}-{name}" for r, name in SHIPPED]
 
 
@@ -78,6 +89,32 @@ def test_the_listing_shows_default_and_meaning(kitchen: Registry[Any]) -> None:
     assert kitchen.summary("kettle") == "Boils water."
     (litres,) = kitchen.parameters("kettle")
     assert (litres.name, litres.default, litres.doc) == ("litres", 1.5, "how much it holds [l]")
+
+
+def test_a_declared_name_belongs_to_its_module() -> None:
+    """Nobody takes a name before its module is imported, which happens when it is built."""
+    registry: Registry[Any] = Registry(Names("appliance", "json", {"kettle": "decoder"}))
+    assert list(registry) == ["kettle"]
+    with pytest.raises(ValueError, match="appliance 'kettle' is registered already"):
+        registry.register("kettle")(Kettle)
+    registry.register("toaster")(Kettle)
+    assert list(registry) == ["kettle", "toaster"]
+
+
+@pytest.mark.parametrize("constant", REGISTRIES)
+def test_the_declared_names_are_those_that_the_modules_register(constant: str) -> None:
+    """Every file of the package that registers something stands in the table, with that name."""
+    registry = REGISTRIES[constant]
+    modules = registry.names.modules
+    package = next(iter(modules.values())).rpartition(".")[0]
+    folder = Path(importlib.import_module(package).__file__ or "").parent
+    registered = re.compile(rf"^@{constant}\.register\(", re.MULTILINE)
+    files = [file for file in folder.glob("*.py") if registered.search(file.read_text("utf-8"))]
+    count = sum(len(registered.findall(file.read_text("utf-8"))) for file in files)
+    assert {name.rpartition(".")[2] for name in modules.values()} == {file.stem for file in files}
+    assert count == len(modules)
+    for name, module in modules.items():
+        assert registry.get(name).__module__ == module
 
 
 @pytest.mark.parametrize(("registry", "name"), SHIPPED, ids=NAMES)

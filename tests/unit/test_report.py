@@ -53,12 +53,12 @@ def refused(capsys: pytest.CaptureFixture[str]) -> Says:
     return said
 
 
-@pytest.fixture(scope="session")
+@pytest.fixture(scope="module")
 def real(networks: Mapping[str, Path], tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A small batch that was really played."""
     file = tmp_path_factory.mktemp("report") / "real.csv"
     words = ["run", "-n", str(networks["pedestrians"]), "-r", "none", "-o", str(file), "-q"]
-    words += ["--agent", "proximity", "--agent", "timing", "--runs", "8", "-j", "2", "--exit-zero"]
+    words += ["--agent", "proximity", "--agent", "timing", "--runs", "8", "--exit-zero"]
     assert main(words) == 0
     return file
 

@@ -16,6 +16,7 @@ from cavsumo.agents import AGENTS
 from cavsumo.agents.casting import params_of, resolve_cast, teams, tester_bodies
 from cavsumo.agents.policy import policy_file
 from cavsumo.agents.recorded import action_between
+from cavsumo.batch.jobs import Memory
 from cavsumo.batch.preflight import recorded_settings
 from cavsumo.batch.replay import Record, known, prepared_again, replayed
 from cavsumo.batch.worker import Worker
@@ -23,10 +24,7 @@ from cavsumo.errors import InputError, ResultsError, UnknownName
 from cavsumo.model.labels import cast_of
 from cavsumo.model.scenario import BatchPlan, Params
 from cavsumo.results.provenance import EXTENT
-from cavsumo.results.traces import Trace, parsed
-
-Memory = tuple[Any, ...]
-
+from cavsumo.results.traces import Trace
 
 # Settings of results that are not the test's: which agents, against whom, how often, how kept.
 OTHERS = EXTENT - {"deadline_s"} | {
@@ -161,9 +159,9 @@ def _trace(record: Record) -> Trace:
         return record.trace
     with Worker(prepared_again(record)) as worker:
         again = replayed(worker, record)
-    if not again.trace:
+    if again.trace is None:
         raise InputError(f"--open-loop: run {record.run} ended in an error: it has no actions")
-    return parsed(again.trace)
+    return again.trace
 
 
 def actions_of(trace: Trace, plan: BatchPlan) -> Memory:

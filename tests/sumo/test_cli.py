@@ -1,37 +1,25 @@
-"""The command line as a process of its own: what it prints, writes and returns."""
+"""The command line: what it prints, writes and returns."""
 
 from __future__ import annotations
 
 import csv
 import json
 import shutil
-import subprocess
-import sys
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 import pytest
+from inline import Done, cavsumo
 
 from cavsumo.results.columns import COLUMNS
-from cavsumo.results.reading import read_manifest, read_rows
+from cavsumo.results.reading import read_rows
 
 CONTROLLERS = """
 class Broken:
     def act(self, snapshot):
         raise RuntimeError("out of petrol")
 """
-
-
-def cavsumo(folder: Path, *words: str) -> subprocess.CompletedProcess[str]:
-    """The command, run in a folder."""
-    return subprocess.run(
-        [sys.executable, "-m", "cavsumo", *words],
-        cwd=folder,
-        capture_output=True,
-        text=True,
-        timeout=300,
-    )
 
 
 @pytest.fixture(scope="module")
@@ -65,24 +53,8 @@ def listing(folder: Path) -> list[str]:
 # What works ---------------------------------------------------------------------------------------
 
 
-def test_one_command_tests_at_a_real_junction(tmp_path: Path, networks: Mapping[str, Path]) -> None:
-    """With a network and nothing else: says what it chose, runs, writes and sums up."""
-    done = cavsumo(tmp_path, "run", "--net", str(networks["crossing"]), "--runs", "2")
-    first = done.stderr.splitlines()[0]
-    for choice in ("agent timing", "ego sumo", "network crossing", "seed 1", "2 episodes"):
-        assert choice in first
-    rows = read_rows(tmp_path / "results.csv")
-    assert [row["run"] for row in rows] == ["0", "1"]
-    assert {row["outcome"] for row in rows} <= {"violated", "held", "not_triggered", "unfair"}
-    manifest = read_manifest(tmp_path / "results.csv")
-    assert (manifest["status"], manifest["episodes"]) == ("finished", 2)
-    assert "timing" in done.stdout
-    assert "in 2 episodes" in done.stdout
-    assert done.returncode == int(any(row["outcome"] == "violated" for row in rows))
-
-
 @pytest.fixture(scope="module")
-def failing(town: Path) -> dict[str, subprocess.CompletedProcess[str]]:
+def failing(town: Path) -> dict[str, Done]:
     """An ego that brakes for nobody, twice the same batch: plainly, and as a study."""
     words = "run -n town.net.xml -r none --ego constant --runs 4 --seed 3 --trace tests".split()
     return {
@@ -91,9 +63,7 @@ def failing(town: Path) -> dict[str, subprocess.CompletedProcess[str]]:
     }
 
 
-def test_an_ego_that_fails_is_exit_status_1(
-    town: Path, failing: Mapping[str, subprocess.CompletedProcess[str]]
-) -> None:
+def test_an_ego_that_fails_is_exit_status_1(town: Path, failing: Mapping[str, Done]) -> None:
     """A script sees the failure, a reader the first one with the command that replays it."""
     assert failing["plain"].returncode == 1
     failures = [r for r in read_rows(town / "plain.csv") if r["outcome"] == "violated"]
@@ -104,16 +74,14 @@ def test_an_ego_that_fails_is_exit_status_1(
 
 
 def test_a_study_is_content_and_quiet(
-    failing: Mapping[str, subprocess.CompletedProcess[str]],
+    failing: Mapping[str, Done],
 ) -> None:
     """Where finding failures is the aim, exit status 0; quiet means not a word."""
     study = failing["study"]
     assert (study.returncode, study.stdout, study.stderr) == (0, "", "")
 
 
-def test_the_same_command_finds_the_same(
-    town: Path, failing: Mapping[str, subprocess.CompletedProcess[str]]
-) -> None:
+def test_the_same_command_finds_the_same(town: Path, failing: Mapping[str, Done]) -> None:
     """Two batches of one seed are equal to the last digit but for the real time they took."""
     assert failing
     batches = [read_rows(town / f"{name}.csv") for name in ("plain", "study")]
@@ -189,7 +157,7 @@ def test_the_weights_of_one_batch_begin_the_next(town: Path) -> None:
 
 ROAD = "run -n town.net.xml"
 REFUSED = [
-    ("", "arguments are required"),
+    ("game", "arguments are required"),
     ("run -n nowhere.net.xml", "no such file; '.' holds bare.net.xml"),
     ("run -n text.net.xml", "not well-formed XML"),
     ("run -n folder.net.xml", "folder.net.xml"),
@@ -198,6 +166,7 @@ REFUSED = [
     (f"{ROAD} --ego constnat", "did you mean 'constant'?"),
     (f"{ROAD} --param ain=0.5", "did you mean 'aim'?"),
     (f"{ROAD} --param aim", "expected KEY=VALUE, got 'aim'"),
+    (f"{ROAD} --kind car --agent q-learning", "can only walk"),
     (f"{ROAD} --testers 0", "testers"),
     (f"{ROAD} --runs 0", "runs"),
     (f"{ROAD} --end nan", "end"),
@@ -246,9 +215,7 @@ def test_bad_input_is_one_sentence(town: Path, words: str, said: str) -> None:
     assert after == before
 
 
-def test_the_header_is_the_interface(
-    town: Path, failing: Mapping[str, subprocess.CompletedProcess[str]]
-) -> None:
+def test_the_header_is_the_interface(town: Path, failing: Mapping[str, Done]) -> None:
     """Columns are written in the order of the documented table, one value for each."""
     assert failing
     with (town / "plain.csv").open(encoding="utf-8", newline="") as stream:

@@ -4,14 +4,12 @@ from __future__ import annotations
 
 import csv
 import shutil
-import signal
-import subprocess
-import sys
 from collections.abc import Callable, Mapping
 from pathlib import Path
 
 import pytest
-from support import PATIENCE_S, ROOT, content, rows, until
+from inline import cavsumo
+from support import ROOT, content, rows, untold
 
 from cavsumo.batch.prepared import prepare
 from cavsumo.batch.summary import interval
@@ -246,36 +244,6 @@ def test_a_study_is_its_batches(home: Path, capsys: pytest.CaptureFixture[str]) 
     assert untold(rows(part)) == untold(rows(single))
 
 
-def untold(found: list[dict[str, str]]) -> list[dict[str, str]]:
-    """Rows without the names of their traces, which hold that of the results."""
-    return [row | {"trace": row["trace"].rpartition("/")[2]} for row in found]
-
-
-@pytest.mark.slow
-def test_an_interrupted_study_goes_on_where_it_stopped(home: Path) -> None:
-    """Ctrl-C in the first batch: 130, the second is not begun; then all is as if played at once."""
-    words = [sys.executable, "-m", "cavsumo", "run", "-c", "study.toml", "--exit-zero", "-q"]
-    words += ["--runs", "4"]
-    process = subprocess.Popen(words, cwd=home)
-    first, second = (home / f"results-testers{n}.csv" for n in (1, 2))
-    try:
-        until(lambda: first.is_file() and first.read_bytes().count(b"\n") > 2, "it plays")
-        process.send_signal(signal.SIGINT)
-        assert process.wait(PATIENCE_S) == 130
-    finally:
-        process.kill()
-        process.wait()
-    assert read_manifest(first)["status"] == "interrupted"
-    assert not second.exists()
-    assert main([*words[3:], "--resume"]) == 0
-    assert main([*words[3:], "-o", "whole.csv"]) == 0
-    for file in (first, second):
-        whole = file.with_name(file.name.replace("results", "whole"))
-        assert untold(rows(file)) == untold(rows(whole))
-        assert read_manifest(file)["status"] == "finished"
-        assert read_manifest(file)["learned"] == read_manifest(whole)["learned"]
-
-
 def test_the_worst_of_a_study_is_its_exit_status(home: Path) -> None:
     """An error in one batch outweighs what the ego did in another."""
     (home / "breaks.py").write_text(
@@ -288,10 +256,7 @@ def test_the_worst_of_a_study_is_its_exit_status(home: Path) -> None:
     file = home / "study.toml"
     text = file.read_text().replace('ego = "constant"', 'ego = "breaks:Breaks"')
     file.write_text(text.replace("runs = 2", "runs = 1"), encoding="utf-8")
-    done = subprocess.run(
-        [sys.executable, "-m", "cavsumo", "run", "-c", "study.toml"],
-        cwd=home, capture_output=True, text=True, timeout=300,
-    )  # fmt: skip
+    done = cavsumo(home, "run", "-c", "study.toml")
     assert done.returncode == 3
     assert "2 could not be run; run 0 of results-testers1.csv: " in done.stdout
     assert "Traceback" not in done.stderr

@@ -16,14 +16,21 @@ import pytest
 from cavsumo.batch.executors import Means
 from cavsumo.batch.preflight import Manner
 from cavsumo.batch.prepared import prepare
-from cavsumo.batch.replay import Record, compare, located, recorded, recorded_alone, replayed
+from cavsumo.batch.replay import (
+    Record,
+    Replayed,
+    compare,
+    located,
+    recorded,
+    recorded_alone,
+    replayed,
+)
 from cavsumo.batch.worker import Worker
 from cavsumo.cli import main
 from cavsumo.cli.commands.replay import ReplayOptions, replay
 from cavsumo.cli.commands.run import run
 from cavsumo.errors import DivergenceError, Exit, InputError, ResultsError
 from cavsumo.results.columns import COLUMNS
-from cavsumo.results.rows import Outcome
 
 Frames = list[dict[str, Any]]
 RUN = 1  # the episode that is played again
@@ -35,7 +42,7 @@ class Recording:
 
     csv_file: Path
     record: Record
-    again: Outcome
+    again: Replayed
 
     @property
     def row(self) -> dict[str, str]:
@@ -52,6 +59,12 @@ class Recording:
     def trace_file(self) -> Path:
         """The trace on disk."""
         return self.csv_file.parent / self.row["trace"]
+
+    @property
+    def frames_again(self) -> list[Any]:
+        """The frames of the replay."""
+        assert self.again.trace is not None
+        return list(self.again.trace.frames)
 
     def difference(
         self, *, row: dict[str, str] | None = None, frames: Frames | None = None
@@ -80,7 +93,7 @@ def recording(networks: dict[str, Path], tmp_path_factory: pytest.TempPathFactor
 def test_a_recorded_episode_comes_out_the_same(recording: Recording) -> None:
     """Row and frames of the replay equal those on disk, in every bit of every body."""
     assert recording.difference() is None
-    assert recording.frames == recording.again.frames
+    assert recording.frames == recording.frames_again
     assert recording.frames[-1]["background"]
     assert len(recording.frames) == int(recording.row["steps"]) + 1
 
@@ -100,7 +113,7 @@ def test_one_changed_number_is_named(
     pose[i] = math.nextafter(pose[i], math.inf)
     said = recording.difference(frames=frames)
     place = f"at step {frame['step']} ({frame['time_s']:.3f} s): {body}.{quantity}"
-    new = recording.again.frames[step]
+    new = recording.frames_again[step]
     was = (new["ego"] if body == "ego" else new["testers"][body])[i]
     assert str(said) == f"run 1 (timing) diverged {place} recorded {pose[i]!r}, replayed {was!r}"
     assert said is not None

@@ -90,7 +90,7 @@ def traced(plan: BatchPlan, run: int, seed: int | None = None) -> Trace:
     if seed is not None:
         again = dataclasses.replace(again, seed=seed)
     with EpisodeRunner(prepare(plan)) as runner:
-        return parsed(runner.play(again)[0].trace)
+        return parsed(runner.play(again).outcome.trace)
 
 
 # What is played

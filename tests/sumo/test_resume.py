@@ -4,16 +4,13 @@ from __future__ import annotations
 
 import json
 import shutil
-import signal
-import subprocess
-import sys
 from collections.abc import Callable, Iterator, Mapping
 from concurrent.futures import Executor
 from pathlib import Path
 from typing import Any
 
 import pytest
-from support import PATIENCE_S, alive, content, rows, traces, until, workers_of
+from support import assert_same, content, rows, traces
 
 from cavsumo.batch import learning
 from cavsumo.batch.batch_run import BatchRun
@@ -30,26 +27,22 @@ DOOMED = (1, 3)  # episodes whose starts can be made fatal
 
 # Drives on unless the file ``doom`` names the place where its first tester starts.
 MORTAL = """
-import os, signal, time
 from pathlib import Path
 from cavsumo.egos import Acceleration
 
 class Mortal:
     depart_speed = 6.0
 
-    def __init__(self, doom="", how="kill"):
-        self.doom, self.how = Path(doom), how
+    def __init__(self, doom=""):
+        self.doom = Path(doom)
 
     def reset(self, scene):
         places = self.doom.read_text().split() if self.doom.is_file() else []
         self.doomed = repr(scene.starts[0].x) in places if scene.starts else False
-        if self.how == "hang" and scene.starts:
-            self.doom.with_name("hanging").touch()
-            time.sleep(3600)
 
     def act(self, snapshot):
         if self.doomed and snapshot.step == 5:
-            os.kill(os.getpid(), signal.SIGKILL)
+            raise RuntimeError("lost the map")
         return Acceleration(0.0)
 """
 
@@ -59,59 +52,10 @@ def never() -> bool:
     return False
 
 
-def assert_same(file: Path, other: Path) -> None:
-    """Rows, traces and what was learned are those of another batch."""
-    assert rows(file) == rows(other)
-    assert traces(file) == traces(other)
-    for key in ("status", "episodes", "counts", "learned", "learned_after", "stopped_by"):
-        assert read_manifest(file)[key] == read_manifest(other)[key], key
-
-
 def copied(file: Path, folder: Path) -> Path:
     """A batch's files in another folder."""
     shutil.copytree(file.parent, folder, dirs_exist_ok=True)
     return folder / file.name
-
-
-def assert_gone(workers: Mapping[int, str]) -> None:
-    """These processes end soon; one that nobody has buried yet counts as gone."""
-    assert workers
-    until(lambda: not any(alive(*worker) for worker in workers.items()), "the workers are gone")
-
-
-class Command:
-    """``cavsumo run`` as a process of its own."""
-
-    def __init__(self, folder: Path, *words: str) -> None:
-        line = [sys.executable, "-m", "cavsumo", "run", *words]
-        self.file = folder / "results.csv"
-        self.said = folder / "stderr"
-        with self.said.open("wb") as stderr:
-            self.process = subprocess.Popen(
-                line, cwd=folder, stdout=subprocess.DEVNULL, stderr=stderr
-            )
-
-    def __enter__(self) -> Command:
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self.process.kill()
-        self.process.wait()
-
-    def reaches(self, lines: int) -> dict[int, str]:
-        """Wait until so many lines are written; the processes that simulate then."""
-        self.until(lambda: self.file.is_file() and self.file.read_bytes().count(b"\n") >= lines)
-        return workers_of(self.process.pid)
-
-    def until(self, happened: Callable[[], Any]) -> None:
-        """Wait until something is so while the command runs."""
-
-        def over() -> bool:
-            ended = self.process.poll()
-            assert ended is None, f"ended with {ended}: {self.said.read_text()}"
-            return bool(happened())
-
-        until(over, "the command had come so far")
 
 
 @pytest.fixture(scope="module")
@@ -130,7 +74,7 @@ def words(networks: Mapping[str, Path]) -> list[str]:
 
 @pytest.fixture(scope="module")
 def executor() -> Iterator[Executor]:
-    """Two processes for all batches that are played in this one."""
+    """Two threads for all batches."""
     with local_executor(2) as threads:
         yield threads
 
@@ -161,7 +105,7 @@ def play(
     retry: bool = False,
     stopped: Callable[[], bool] = never,
 ) -> None:
-    """What ``cavsumo run`` does, with processes that stay for the next batch."""
+    """What ``cavsumo run`` does, with workers that stay for the next batch."""
     now = manifest(prepared)
     with Recorder(file) as recorder:
         batch_run = BatchRun(prepared, recorder, executor, 2, stopped)
@@ -179,29 +123,6 @@ def play(
 
 
 # Killed -------------------------------------------------------------------------------------------
-
-
-@pytest.mark.slow
-def test_a_batch_killed_again_and_again_is_the_one_that_was_not(
-    quiet: Path, words: list[str], tmp_path: Path
-) -> None:
-    """SIGKILL before the first row and after some; --resume knows the settings.
-
-    No process that simulates outlives the one that was killed.
-    """
-    for lines in (1, 7):
-        started = (tmp_path / "results.json").exists()
-        with Command(tmp_path, "--resume", "-q", *([] if started else words)) as command:
-            workers = command.reaches(lines)
-            assert workers
-            command.process.kill()
-            command.process.wait()
-            assert_gone(workers)
-        assert read_manifest(command.file)["status"] == "running"
-        assert command.file.read_bytes().count(b"\n") < 2 * RUNS + 1
-    with Command(tmp_path, "--resume", "-q", "-j", "2") as command:
-        assert command.process.wait(PATIENCE_S) in (0, 1)
-    assert_same(command.file, quiet)
 
 
 class Killed(BaseException):
@@ -249,63 +170,6 @@ def test_a_batch_killed_before_its_manifest_can_be_gone_on_with(
     line = "-r none --end 2 --runs 1 --agent noop --testers 1 -q --resume"
     assert main(["run", "-n", str(networks["pedestrians"]), *line.split()]) == 0
     assert len(rows(Path("results.csv"))) == 1
-
-
-def test_workers_that_hang_die_with_their_parent(
-    networks: Mapping[str, Path], tmp_path: Path
-) -> None:
-    """The parent is killed while an episode never ends: nobody hangs on."""
-    (tmp_path / "mortal.py").write_text(MORTAL, encoding="utf-8")
-    line = "-r none --ego mortal:Mortal --ego-param how=hang --agent noop -q -j 2 --deadline 600"
-    doom = f"doom={tmp_path / 'doom'}"
-    words = ["-n", str(networks["pedestrians"]), *line.split(), "--ego-param", doom]
-    with Command(tmp_path, *words) as command:
-        command.until((tmp_path / "hanging").exists)
-        workers = workers_of(command.process.pid)
-        command.process.kill()
-        assert_gone(workers)
-
-
-# Interrupted --------------------------------------------------------------------------------------
-
-
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
-def test_an_interrupted_batch_can_be_gone_on_with(
-    quiet: Path, words: list[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch, number: int
-) -> None:
-    """Ctrl-C, or a scheduler whose time is up: exit 130, whole rows, and the rest later."""
-    with Command(tmp_path, *words) as command:
-        workers = command.reaches(4)
-        command.process.send_signal(number)
-        assert command.process.wait(PATIENCE_S) == 130
-        assert_gone(workers)
-    there = rows(command.file)
-    told = read_manifest(command.file)
-    assert (told["status"], told["episodes"]) == ("interrupted", len(there))
-    assert there == rows(quiet)[: len(there)]
-    assert 3 <= len(there) < 2 * RUNS
-    monkeypatch.chdir(tmp_path)
-    assert main(["run", "--resume", "-q", "-j", "2"]) in (0, 1)
-    assert_same(command.file, quiet)
-
-
-def test_a_second_interrupt_ends_at_once(networks: Mapping[str, Path], tmp_path: Path) -> None:
-    """Whoever does not want to wait for what runs need not: exit 130, whole rows, nobody left."""
-    (tmp_path / "mortal.py").write_text(MORTAL, encoding="utf-8")
-    line = "-r none --ego mortal:Mortal --ego-param how=hang --agent noop --deadline 600"
-    doom = f"doom={tmp_path / 'doom'}"
-    words = ["-n", str(networks["pedestrians"]), *line.split(), "--ego-param", doom]
-    with Command(tmp_path, *words) as command:
-        command.until((tmp_path / "hanging").exists)
-        workers = workers_of(command.process.pid)
-        command.process.send_signal(signal.SIGINT)
-        command.until(lambda: "once more to stop at once" in command.said.read_text())
-        command.process.send_signal(signal.SIGINT)
-        assert command.process.wait(PATIENCE_S) == 130
-        assert_gone(workers)
-    assert "Traceback" not in command.said.read_text()
-    assert rows(command.file) == []
-    assert read_manifest(command.file)["status"] == "interrupted"
 
 
 # Gone on with -------------------------------------------------------------------------------------
@@ -602,7 +466,7 @@ def test_the_command_line_plays_errors_again(
     monkeypatch.chdir(tmp_path)
     assert main(["run", "--resume"]) == 3
     printed = capsys.readouterr().out
-    assert f"{len(FATAL)} could not be run; run {FATAL[0]}: the simulation process died" in printed
+    assert f"{len(FATAL)} could not be run; run {FATAL[0]}: ego mortal:Mortal at 0.50 s" in printed
     assert "--retry-errors" in printed
     assert main(["run", "--retry-errors"]) in (0, 1)
     printed = capsys.readouterr().out

@@ -235,7 +235,7 @@ def test_the_command_line_stops_goes_on_and_says_that_the_intervals_are_valid(
         (["--budget", "-1"], "budget_s: "),
         (["--budget", "0"], "budget_s: "),
         (["--budget", "inf"], "budget_s: "),
-        (["--until-rate", "violations"], "--until-rate: invalid choice: 'violations'"),
+        (["--until-rate", "violations"], "until_rate: unknown value 'violations'"),
     ],
 )
 def test_a_rule_that_makes_no_sense_is_refused(

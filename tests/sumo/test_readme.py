@@ -6,11 +6,10 @@ import itertools
 import re
 import shlex
 import shutil
-import subprocess
-import sys
 from pathlib import Path
 
 import pytest
+from inline import cavsumo
 from support import ROOT
 
 from cavsumo.batch.preflight import Manner, checked
@@ -24,13 +23,6 @@ COMMANDS = sorted(set(re.findall(r"cavsumo run [^`\n]*", README)))
 FIRST = (ROOT / "README.md").read_text(encoding="utf-8")
 AGAIN = ("--help", "--resume", "--retry-errors")
 PLAYED = [c for c in COMMANDS if c in FIRST or set(AGAIN) & set(c.split())]
-
-
-def cavsumo(words: list[str], folder: Path) -> subprocess.CompletedProcess[str]:
-    """The command line in a folder of its own."""
-    return subprocess.run(
-        [sys.executable, "-m", "cavsumo", *words], cwd=folder, capture_output=True, text=True
-    )
 
 
 @pytest.fixture(scope="module")
@@ -49,7 +41,7 @@ def checkout(tmp_path_factory: pytest.TempPathFactory) -> Path:
         (folder / name).write_text(text, encoding="utf-8")
     (folder / "my.net.xml").symlink_to(ROOT / "networks" / "pedestrians.net.xml")
     first = ["run", "--net", "my.net.xml", "-r", "none", "--runs", "1", "--end", "1"]
-    cavsumo([*first, "-o", "results.csv"], folder)
+    cavsumo(folder, *first, "-o", "results.csv")
     return folder
 
 
@@ -63,7 +55,7 @@ def test_each_run_command_of_the_readme_runs(command: str, checkout: Path) -> No
         pytest.skip("nobody listens there; test_external_egos.py has the server")
     if not set(AGAIN) & set(words):
         words += ["--runs", "1", "-o", "readme.csv"]
-    done = cavsumo(words, checkout)
+    done = cavsumo(checkout, *words)
     assert done.returncode in (0, 1), done.stderr
     assert "Traceback" not in done.stderr
 
@@ -87,7 +79,7 @@ def test_each_report_of_the_readme_is_written(command: str, checkout: Path) -> N
         if name.endswith(".csv") and name != "results.csv":
             shutil.copy(checkout / "results.csv", checkout / name)
             shutil.copy(checkout / "results.json", checkout / f"{Path(name).stem}.json")
-    done = cavsumo(words, checkout)
+    done = cavsumo(checkout, *words)
     assert (done.returncode, done.stderr) == (0, "")
     for option, file in itertools.pairwise(words):
         if option in ("-o", "--junit"):
@@ -111,5 +103,5 @@ def test_links_lead_somewhere(file: str) -> None:
 
 def test_the_agents_of_the_readme_are_those_that_there_are(checkout: Path) -> None:
     """The README's table of testers names every agent that is listed."""
-    listed = {line.split()[0] for line in cavsumo(["agents"], checkout).stdout.splitlines()}
+    listed = {line.split()[0] for line in cavsumo(checkout, "agents").stdout.splitlines()}
     assert listed == set(re.findall(r"^\| `([a-z-]+|policy:FILE)` \|", README, re.MULTILINE))

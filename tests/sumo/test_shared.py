@@ -2,17 +2,16 @@
 
 from __future__ import annotations
 
-import subprocess
-import sys
 from collections.abc import Callable
 from pathlib import Path
 
 import libsumo
 import pytest
+from inline import cavsumo
 
 from cavsumo.model.bodies import PEDESTRIAN, Body
 from cavsumo.model.carriageway import Start
-from cavsumo.model.scenario import SHARED_BY, Simulation
+from cavsumo.model.scenario import Simulation
 from cavsumo.model.snapshot import BodyState, Snapshot
 from cavsumo.results.reading import read_rows
 from cavsumo.results.rows import is_test
@@ -47,8 +46,7 @@ def who(seen: list[Snapshot]) -> list[set[str]]:
 
 def run(folder: Path, *words: str, name: str = "r.csv") -> list[dict[str, str]]:
     """The rows of ``cavsumo run --reset shared``, without the real time."""
-    command = [sys.executable, "-m", "cavsumo", "run", "-q", "--exit-zero", "-o", name, *words]
-    done = subprocess.run(command, cwd=folder, capture_output=True, text=True, timeout=300)
+    done = cavsumo(folder, "run", "-q", "--exit-zero", "-o", name, *words)
     assert done.returncode == 0, done.stderr
     return [{k: v for k, v in row.items() if k != "wall_s"} for row in read_rows(folder / name)]
 
@@ -94,22 +92,6 @@ def test_lights_begin_anew(open_world: Opener) -> None:
     assert first[0]
 
 
-@pytest.mark.slow
-def test_rows_do_not_depend_on_who_plays_them(networks: dict[str, Path], tmp_path: Path) -> None:
-    """One process or two, at once or resumed in the middle of a block: the same rows."""
-    words = ["-n", str(networks["crossing"]), "--reset", "shared", "--runs", str(SHARED_BY + 3)]
-    words += ["--testers", "1", "--end", "6"]
-    alone = run(tmp_path, *words, name="alone.csv")
-    assert run(tmp_path, *words, "-j", "2", name="two.csv") == [
-        row | {"trace": row["trace"].replace("alone/", "two/")} for row in alone
-    ]
-    file = tmp_path / "two.csv"
-    lines = file.read_bytes().splitlines(keepends=True)
-    file.write_bytes(b"".join(lines[:12]))
-    again = run(tmp_path, "--resume", name="two.csv")
-    assert [r | {"trace": ""} for r in again] == [r | {"trace": ""} for r in alone]
-
-
 def test_every_test_found_was_played_again_in_a_fresh_simulation(
     networks: dict[str, Path], tmp_path: Path
 ) -> None:
@@ -125,10 +107,7 @@ def test_every_test_found_was_played_again_in_a_fresh_simulation(
             assert row | {"trace": ""} == reference | {"trace": ""}
     for reset in ("fresh", "shared"):
         number = next(row["run"] for row in shared if row["reset"] == reset)
-        done = subprocess.run(
-            [sys.executable, "-m", "cavsumo", "replay", "r.csv", number],
-            cwd=tmp_path, capture_output=True, text=True, timeout=120,
-        )  # fmt: skip
+        done = cavsumo(tmp_path, "replay", "r.csv", number)
         assert done.returncode == 0, done.stdout + done.stderr
         assert "the same" in done.stdout
 
@@ -137,9 +116,8 @@ def test_the_summary_says_how_many_did_not_come_out_again(
     networks: dict[str, Path], tmp_path: Path
 ) -> None:
     """Found and lost are counted: a search does not pass for a measurement."""
-    command = [sys.executable, "-m", "cavsumo", "run", "-n", str(networks["crossing"])]
-    command += ["--runs", "6", "--reset", "shared", "--trace", "none", "-o", "r.csv"]
-    done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, timeout=120)
+    words = ["-n", str(networks["crossing"]), "--runs", "6", "--reset", "shared"]
+    done = cavsumo(tmp_path, "run", *words, "--trace", "none", "-o", "r.csv")
     rows = read_rows(tmp_path / "r.csv")
     found = sum(row["reset"] == "fresh" for row in rows)
     lost = found - sum(map(is_test, rows))
@@ -172,9 +150,8 @@ def test_a_person_who_rides_is_refused(networks: dict[str, Path], tmp_path: Path
         "</person>"
         "</routes>"
     )
-    command = [sys.executable, "-m", "cavsumo", "run", "-n", str(networks["pedestrians"])]
-    command += ["-r", str(file), "--reset", "shared", "-o", "r.csv", "--runs", "1"]
-    done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, timeout=120)
+    words = ["-n", str(networks["pedestrians"]), "-r", str(file), "--reset", "shared"]
+    done = cavsumo(tmp_path, "run", *words, "-o", "r.csv", "--runs", "1")
     assert done.returncode == 2, done.stderr
     assert "person 'rider' rides" in done.stderr
     assert not (tmp_path / "r.csv").exists()
