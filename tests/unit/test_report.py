@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import dataclasses
 import io
 import itertools
 import json
@@ -17,8 +18,9 @@ from report_files import ERROR, FAILED, HELD, JUDGED, NOTHING, SOME, UNFAIR, wri
 from cavsumo.cli import main
 from cavsumo.errors import InputError
 from cavsumo.report.analysis import Report, analyse
-from cavsumo.report.events import side_ahead, side_hit
-from cavsumo.report.formats import FORMATS
+from cavsumo.report.distinct import Cell, FailureCell, failure_cells
+from cavsumo.report.events import Described, Event, side_ahead, side_hit
+from cavsumo.report.formats import FORMATS, as_table
 from cavsumo.results.columns import COLUMNS
 from cavsumo.results.reading import read_rows
 from cavsumo.results.traces import read_moments, read_trace, trace_text
@@ -446,6 +448,30 @@ def test_sides_of_the_ego(turn: float, ahead: float, left: float, hit: str, zone
     other = [10.0 + ahead * c - left * s, 5.0 + ahead * s + left * c, 1.0, 0.0]
     assert side_hit(ego, other) == hit
     assert side_ahead(ego, other) == zone
+
+
+@pytest.mark.parametrize(
+    ("cells", "said"),
+    [
+        (11, "1 failure in 1 more cell is not shown."),
+        (12, "2 failures in 2 more cells are not shown."),
+    ],
+)
+def test_the_rest_of_the_cells_is_counted_in_words(some: Report, cells: int, said: str) -> None:
+    """One failure in one cell is a singular."""
+    places = [Cell("", "pedestrian", "front", 2.0 * i, 10.0) for i in range(cells)]
+    found = [FailureCell(cell, 1, 0, "some.csv", i, ("a",)) for i, cell in enumerate(places)]
+    assert said in as_table(dataclasses.replace(some, failures=found))
+
+
+def test_failures_that_are_preventable_come_first_in_cells_and_runs(tmp_path: Path) -> None:
+    """A cell that was preventable once stands before one that never was, with that run."""
+    file = write(tmp_path / "r.csv", JUDGED, reference="human")
+    report = analyse([file])
+    where = Event(3.0, "front", 20.0, 0.0, 0.0)
+    tests = {i: Described(where, where) for i in report.tests}
+    (cell,) = failure_cells(report.groups, tests, report.evidence.batches)
+    assert (cell.count, cell.preventable, cell.run) == (5, 3, 1)
 
 
 # JUnit
