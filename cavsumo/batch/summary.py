@@ -40,7 +40,7 @@ def summarise(ended: Sequence[Ended]) -> None:
     rows = sum(one.tally.rows for one in ended)
     tests, episodes = sentences.many(together.tests, "test"), sentences.many(rows, "episode")
     failed = sentences.failures(together, _judged(ended))
-    _say(console, f"\n{failed} in {tests}, {episodes}.  {_files(ended)}")
+    _say(console, f"\n{failed}, {tests} in {episodes}.  {_files(ended)}")
     _say_invalid(ended, console)
     for one in ended:
         _say_forecasts(one, console)

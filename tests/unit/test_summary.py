@@ -59,7 +59,7 @@ def test_the_preventable_failures_lead(tmp_path: Path, capsys: pytest.CaptureFix
     assert list(cells)[:4] == ["agent", "runs", "preventable", "of tests [95 %]"]
     assert (cells["preventable"], cells["unpreventable"], cells["not judged"]) == ("1", "1", "1")
     assert cells["of tests [95 %]"].startswith("25.0 % [")
-    assert "\n1 preventable failure in 4 tests, 8 episodes." in said
+    assert "\n1 preventable failure, 4 tests in 8 episodes." in said
     who = "preventable by a careful human driver (UN R157)"
     assert f"\n1 failure {who}; apart from that 1 unpreventable, 1 not judged\n" in said
     assert "first preventable failure: run 2 (timing)" in said
@@ -71,7 +71,7 @@ def test_without_a_reference_failures_are_failures(
     """Nobody judged, so nothing is said of what was preventable."""
     said = shown(batch(tmp_path / "r.csv", [[NOTHING], [FAILED], [HELD]], "none"), capsys)
     assert table(said)["failures"] == "1"
-    assert "\n1 failure in 2 tests, 3 episodes." in said
+    assert "\n1 failure, 2 tests in 3 episodes." in said
     assert "first failure: run 1 (timing)" in said
     assert "preventable" not in said
     assert "judged" not in said
