@@ -184,7 +184,8 @@ def bare_loop(world: World, seed: int, tracks: list[list[Any]]) -> float:
     vehicle, person, simulation = libsumo.vehicle, libsumo.person, libsumo.simulation
     move, set_speed = vehicle.moveToXY, vehicle.setSpeed
     libsumo.close()
-    libsumo.start(world.simulations.command(seed))
+    simulations = world.simulations
+    libsumo.start(simulations.command(seed, simulations.routes))
     insert(world, tracks[0])
     mine = {"ego", *(t[0] for t in tracks[0])}
     for step, track in enumerate(tracks):

@@ -1,8 +1,8 @@
 """cavsumo: generates tests for autonomous vehicles in SUMO.
 
-``cavsumo.run`` and the other public names are described in ``docs/python.md``; the rooms, in the
-order in which they may use each other, in ``docs/architecture.md``. Nothing of them is imported
-before it is used, so that ``import cavsumo`` costs nothing.
+``docs/python.md`` describes ``cavsumo.run`` and the other public names, ``docs/architecture.md``
+the rooms, in the order in which they may use each other. No room is imported before it is used, so
+that ``import cavsumo`` is quick.
 """
 
 from __future__ import annotations
@@ -53,7 +53,7 @@ _PUBLIC = {
 }
 __all__ = [*_PUBLIC]
 
-# Modules that version 0.1 had at the root and that users import, by where they stand now.
+# Modules that version 0.1 had at the root and that users import, by their present names.
 _MOVED = {
     "bodies": "model.bodies",
     "checks": "model.checks",
@@ -93,7 +93,7 @@ class _MovedModules(MetaPathFinder, Loader):
         return module
 
     def exec_module(self, module: ModuleType) -> None:
-        """Nothing is left to load; the module keeps the spec of its new name."""
+        """The module is already loaded; it keeps the spec of its new name."""
         module.__spec__ = module.__spec__ and module.__spec__.loader_state
 
 

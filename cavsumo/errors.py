@@ -1,19 +1,19 @@
-"""Everything that can go wrong, as one short tree.
+"""The errors of cavsumo, as one short tree.
 
 ::
 
-    CavsumoError                what a user sees as one sentence, never as a traceback
+    CavsumoError                shown to the user as one sentence, never as a traceback
     |-- InputError              the command line or an input file is wrong (exit status 2)
     |   |-- UnknownName         a name that no registry, network or file has
     |   `-- NetworkError        a network that cannot serve the test asked for
     |-- NoSuchAction            no action leads from one state to another (seed, eq. 22)
-    |-- EgoError                the ego's controller raised or gave an answer that is none
-    |-- AssertionFault          a user's assertion raised or gave a judgement that is none
+    |-- EgoError                the ego's controller raised or gave an invalid answer
+    |-- AssertionFault          a user's assertion raised or gave an invalid judgement
     |-- AgentError              a tester agent raised or chose an action outside its space
     |-- SimulationError         SUMO refused a call, or the ego never entered the network
     |   `-- SimulationTaken     another world took the one simulation of this process
     |-- DivergenceError         a replay departs from its record (exit status 1)
-    |-- BatchError              a batch cannot go on; what ran is kept (exit status 3)
+    |-- BatchError              a batch cannot continue; finished rows are kept (exit status 3)
     `-- ResultsError            results on disk are missing, foreign or damaged (exit status 2)
 """
 
@@ -31,11 +31,11 @@ class Exit(IntEnum):
     VIOLATED = 1  # it violated an assertion at least once
     USAGE = 2  # the command line or an input file is wrong
     NOT_RUN = 3  # an episode could not be run
-    INTERRUPTED = 130  # interrupted; what ran is in the results
+    INTERRUPTED = 130  # interrupted; finished rows are in the results
 
 
 class CavsumoError(Exception):
-    """Base of every error that cavsumo raises on purpose; its message says what to do."""
+    """Base of every error that cavsumo raises on purpose; its message gives a remedy."""
 
 
 class InputError(CavsumoError):
@@ -60,11 +60,11 @@ class NoSuchAction(CavsumoError, ValueError):
 
 
 class EgoError(CavsumoError):
-    """The ego's controller raised, or gave an answer that is none."""
+    """The ego's controller raised, or gave an invalid answer."""
 
 
 class AssertionFault(CavsumoError):
-    """A user's assertion or formula raised, or gave a judgement that is none."""
+    """A user's assertion or formula raised, or gave an invalid judgement."""
 
 
 class AgentError(CavsumoError):
@@ -80,11 +80,11 @@ class SimulationTaken(SimulationError):
 
 
 class DivergenceError(CavsumoError):
-    """A replay departs from its record; the message says where first.
+    """A replay departs from its record; the message names the first difference.
 
     Attributes:
         step: the timestep; None when the frames agree and the row does not.
-        body: id of the body, empty when it is no body's quantity.
+        body: id of the body, empty for a quantity without a body.
         quantity: x, y, v or o of a body, another key of a frame, or a column of the row.
     """
 
@@ -94,7 +94,7 @@ class DivergenceError(CavsumoError):
 
 
 class BatchError(CavsumoError):
-    """A batch cannot go on: a full disk, a lost scheduler, no process to simulate in."""
+    """A batch cannot continue: a full disk, a lost scheduler, no process to simulate in."""
 
 
 class ResultsError(InputError):

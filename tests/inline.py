@@ -53,7 +53,7 @@ def _start(self: Worker) -> None:
             prepared.check_here()
             runner = EpisodeRunner(prepared)
             _RUNNERS[self] = runner
-            workers._WORKERS.add(self)
+            self._group.add(self)
             runner.try_out()
         except (CavsumoError, OSError) as error:
             _close(self)
@@ -71,7 +71,7 @@ def _close(self: Worker) -> None:
     """End SUMO and the ego."""
     with _ONE_SUMO:
         self.closed = True
-        workers._WORKERS.discard(self)
+        self._group.discard(self)
         if runner := _RUNNERS.pop(self, None):
             runner.__exit__(None, None, None)
 

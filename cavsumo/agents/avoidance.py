@@ -1,13 +1,12 @@
-"""How a body that walks keeps out of other bodies: it stops before them, waits, and goes round.
+"""Collision avoidance of pedestrians: they stop before other bodies, wait, and go round.
 
-A body takes an action only if it could still stop afterwards before everybody ahead of it; else it
-brakes. That is looked up on boxes: the room that it passes over while it stops, against where the
-others are and where their speed brings them meanwhile. Of two testers the later one in the order of
-the scenario yields: the other one counts on it to stop. Nobody waits for ever: after a while a
-body that crosses a road goes round whoever stands in its way, and one that walks along a pavement
-turns back (``agents.behaviours``).
+A body takes an action only if it could still stop afterwards before all bodies ahead of it;
+otherwise it brakes. The check uses boxes: the area that it covers while it stops, against the
+positions of the others now and after that time. Of two testers the later one in the order of the
+scenario yields; the other one relies on that. The waiting time is bounded: then a body that crosses
+a road goes round the obstacle, and one on a pavement turns back (``agents.behaviours``).
 
-The moving ego is avoided by nobody: that it must avoid the testers is the test.
+No tester avoids the moving ego: the test is whether the ego avoids the testers.
 """
 
 from __future__ import annotations
@@ -23,36 +22,36 @@ from cavsumo.model.scene import Scene
 from cavsumo.model.snapshot import AROUND_M, BodyState, Snapshot
 from cavsumo.model.stopping_way import is_clear, stopping_way, stretched
 
-KEEP_M = 0.65  # room kept to who is ahead: enough to turn back in
-START_M = 0.3  # so much more of it lets one who stands go on, or it would creep up
-# Boxes are larger than people: so much of a side may brush another's [m] (``validity.DEEP_M``).
+KEEP_M = 0.65  # distance kept to a body ahead: enough to turn back
+START_M = 0.3  # additional distance before a standing body walks on, or it would creep up
+# Boxes are larger than people: allowed overlap of two boxes at each side [m] (``validity.DEEP_M``).
 BRUSH_TESTER_M, BRUSH_M = 0.15, 0.05
-DEEPEST = 1.8  # who turns while somebody is in it gets no deeper than so many times that
-PATIENCE_S, YIELDING_S = 4.0, 2.0  # how long one waits, and for a tester that goes first
-ROUND_S = 12.0  # a way round that takes longer is given up
+DEEPEST = 1.8  # a body that turns inside an overlap gets at most so many times deeper
+PATIENCE_S, YIELDING_S = 4.0, 2.0  # waiting time of the tester that yields, and of the other one
+ROUND_S = 12.0  # a longer way round is given up
 ROUND_MPS = 0.7  # speed on the way round
-CLEAR_M = 2.0  # a way is free again that is so far clear ahead
-CREEPING_MPS = 0.3  # who gets on no faster still waits
+CLEAR_M = 2.0  # distance ahead that must be clear for a free way
+CREEPING_MPS = 0.3  # a slower body still counts as waiting
 STILL_MPS = 0.1  # a slower ego stands
 
 
 class Avoidance:
-    """Keeps one body on foot out of the others, in one episode.
+    """Collision avoidance of one pedestrian, in one episode.
 
     Attributes:
-        waited: for how long it has been kept from walking [s].
-        tired: whether that is longer than it waits.
+        waited: time for which it has been blocked [s].
+        tired: whether it has waited too long.
     """
 
     def __init__(self, scene: Scene, index: int) -> None:
         self.scene, self.index = scene, index
         self.waited, self.tired = 0.0, False
         self._turning: float | None = None  # the heading from which it turns back
-        self._until: float | None = None  # when it gives up to go round, and to which side it goes
+        self._until: float | None = None  # when it gives up going round, and on which side it goes
         self._side = 1.0
 
     def along(self, snapshot: Snapshot, state: BodyState, wanted: Action) -> Action:
-        """The action wanted, or a brake where that leads into somebody."""
+        """The wanted action, or a brake if that leads into another body."""
         if self._turning is not None and abs(wrap(state.o - self._turning)) > math.pi / 2:
             self._turning = None
         blocker = self._blocker(snapshot, state, wanted, close=self._turning is not None)
@@ -69,7 +68,7 @@ class Avoidance:
     def across(
         self, snapshot: Snapshot, state: BodyState, wanted: Action, heading: float
     ) -> Action:
-        """The same on a way with that heading, and round whoever stays in it."""
+        """The same on a way with that heading, and round a body that stays in it."""
         if state.v <= 0.0 and wanted.throttle <= 0.0:
             self.rest()
         if self._until is None:
@@ -92,21 +91,21 @@ class Avoidance:
         return _brake(state, self.scene.dt)
 
     def rest(self) -> None:
-        """Forget that it waited."""
+        """Reset the waiting time."""
         self._until = self._turning = None
         self.waited, self.tired = 0.0, False
 
     def turn_back(self, state: BodyState) -> None:
-        """Let it turn where it is, close to whoever is ahead."""
+        """Let it turn on the spot, close to the body ahead."""
         self.rest()
         self._turning = state.o
 
     def _blocker(
         self, snapshot: Snapshot, state: BodyState, action: Action, *, close: bool
     ) -> BodyState | None:
-        """Somebody before whom the body could not stop any more after an action.
+        """The body before which this one could not stop any more after an action.
 
-        ``close``: who is ahead is passed by a hair's breadth, and left if it is in the body.
+        ``close``: a body ahead may be passed very closely, and left if the boxes overlap.
         """
         body, x, y, v, o = state
         if v <= 0.0 and action.throttle <= 0.0:
@@ -134,7 +133,7 @@ class Avoidance:
     def _others(
         self, snapshot: Snapshot, state: BodyState
     ) -> Iterator[tuple[BodyState, float, bool]]:
-        """Whoever is near: how much of it may be brushed [m] and whether it will stop."""
+        """The bodies near: the allowed overlap with each [m] and whether it will stop."""
         x, y, near = state.x, state.y, state.body.kind.reach + AROUND_M
         for i, tester in enumerate(snapshot.testers):
             reach = near + tester.body.kind.reach
@@ -165,20 +164,20 @@ def _comes_to(
 
 
 def _shrunk(box: Box, by: float) -> Box:
-    """A box without so much on all sides [m]: it touches what the box is deeper in than that."""
+    """A box smaller by a depth on all sides [m]: it touches those that the box overlaps deeper."""
     return box._replace(length=box.length - 2.0 * by, width=box.width - 2.0 * by)
 
 
 def _narrow(box: Box, brush: float) -> Box:
-    """A box without so much of either side [m]."""
+    """A box narrower by a depth on either side [m]."""
     return box._replace(width=box.width - 2.0 * brush)
 
 
 def _aside(state: BodyState, other: BodyState) -> float:
-    """How far another body is to the left of the way straight on [m]."""
+    """Lateral offset of another body from the way straight on, positive to the left [m]."""
     return (other.y - state.y) * math.cos(state.o) - (other.x - state.x) * math.sin(state.o)
 
 
 def _brake(state: BodyState, dt: float) -> Action:
-    """Stop as hard as can be, without a turn."""
+    """Full braking, without a turn."""
     return Action(max(state.body.kind.throttle_min, -state.v / dt), 0.0)

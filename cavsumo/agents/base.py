@@ -1,4 +1,4 @@
-"""What a tester agent is: it sees snapshots and chooses actions for the bodies it owns."""
+"""The protocol of tester agents, which see snapshots and choose actions for the bodies they own."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ import numpy as np
 
 from cavsumo.agents.names import AGENT_NAMES
 from cavsumo.model.bodies import NOOP, Action, Kind
+from cavsumo.model.carriageway import StartRecord
 from cavsumo.model.registry import Registry
 from cavsumo.model.scene import Scene
 from cavsumo.model.snapshot import BodyState, Snapshot
@@ -17,7 +18,7 @@ VERDICTS = SURE, UNDECIDED, NOT_FORCEABLE = "sure", "undecided", "not-forceable"
 
 
 class Forecast(NamedTuple):
-    """What an agent says of an episode before it is played.
+    """The forecast of an agent for an episode before it is played.
 
     Attributes:
         verdict: SURE, UNDECIDED or NOT_FORCEABLE: whether it brings about a test.
@@ -35,7 +36,7 @@ class Forecast(NamedTuple):
 class Agent:
     """Base of the tester agents; on its own it does nothing at all.
 
-    An agent lives as long as a batch: ``reset`` begins an episode, what it learned stays.
+    An agent exists for a whole batch: ``reset`` begins an episode and keeps its knowledge.
 
     Attributes:
         sees_background: whether it looks at background traffic farther than ``snapshot.AROUND_M``
@@ -43,9 +44,11 @@ class Agent:
             that are far from everybody are left out of the snapshots.
         drives: whether its bodies may be vehicles. Set False where it can only walk.
         learns: whether episodes change what it knows: then they are played in sequence.
-        promise: against whom its forecasts hold; empty for agents that make none.
+        promise: the class of egos for which its forecasts hold; empty for none.
         manoeuvre: the one manoeuvre that its vehicles are asked to do (``manoeuvres.MANOEUVRES``):
             they start where it is possible; "auto" for whichever is possible where they start.
+        recorded_starts: where its bodies start, for an agent that plays back; empty to draw it.
+        recorded_waits: where they wait until the ego has entered; empty for where they start.
         FILES: its parameters that name files; their checksums are noted with the results.
     """
 
@@ -56,6 +59,8 @@ class Agent:
     drives: bool = True
     promise: str = ""
     manoeuvre: str = "auto"
+    recorded_starts: Sequence[StartRecord] = ()
+    recorded_waits: Sequence[StartRecord] = ()
 
     scene: Scene
     owned: tuple[int, ...]
@@ -65,12 +70,12 @@ class Agent:
         """Raise ValueError unless the agent can own so many bodies of a kind."""
 
     def prepare(self) -> None:
-        """Do once what would take long in an episode; called before any, in every process."""
+        """Do long computations once, before the first episode; called in every process."""
 
     def reset(self, scene: Scene, owned: Sequence[int], rng: np.random.Generator) -> None:
         """Begin an episode with the bodies ``scene.bodies[i] for i in owned``.
 
-        The generator belongs to this agent for this episode; nobody else draws from it.
+        The generator belongs to this agent for this episode alone.
         """
         self.scene, self.owned, self.rng = scene, tuple(owned), rng
 
@@ -100,11 +105,11 @@ class Agent:
         """
 
     def recall(self) -> Any:
-        """What the agent learned so far, as plain data; None when it does not learn."""
+        """The knowledge of the agent, as plain data; None when it does not learn."""
         return None
 
     def remember(self, memory: Any) -> None:
-        """Take up what an earlier life of this agent learned."""
+        """Take up the knowledge of an earlier instance of this agent."""
 
     def own(self, snapshot: Snapshot) -> list[BodyState]:
         """The states of the owned bodies."""
@@ -112,7 +117,7 @@ class Agent:
 
     @classmethod
     def coordinate(cls, agents: Sequence[Agent], rng: np.random.Generator) -> None:
-        """Let the agents of one episode know of each other; called after their resets."""
+        """Make the agents of one episode known to each other; called after their resets."""
 
 
 AGENTS: Registry[Agent] = Registry(AGENT_NAMES)
@@ -126,7 +131,7 @@ class NoopAgent(Agent):
 
 
 def learner_of(learned: Mapping[str, Any], name: str) -> Any:
-    """What the learner of a batch knows, by its manifest: that without a label, or the only one."""
+    """The knowledge of a batch's learner in its manifest: that without a label, or the only one."""
     if name not in learned and len(learned) == 1:
         return next(iter(learned.values()))
     return learned[name]

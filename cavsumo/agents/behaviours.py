@@ -1,4 +1,4 @@
-"""The programmed behaviour of one body, walking or driving; which of them, its start says.
+"""The programmed behaviour of one body, walking or driving as its start requires.
 
 A behaviour idles until it is begun, is active for a while, and idles again.
 """
@@ -17,20 +17,20 @@ from cavsumo.model.snapshot import BodyState, Snapshot
 
 
 class Behaviour(Protocol):
-    """What a programmed body does before, while and after it is active."""
+    """The actions of a programmed body before, while and after it is active."""
 
     @property
     def active(self) -> bool:
         """Whether the behaviour is under way."""
 
     def idle(self, snapshot: Snapshot, state: BodyState) -> Action:
-        """The next action while it is not."""
+        """The next action while it is inactive."""
 
     def begin(self, state: BodyState) -> bool:
-        """Begin here and now; False where that is impossible."""
+        """Begin now; False if that is impossible."""
 
     def over(self, state: BodyState) -> bool:
-        """The terminator psi: whether what is under way is done. Changes nothing."""
+        """The terminator psi: whether the behaviour has reached its end. Changes nothing."""
 
     def end(self) -> None:
         """Be inactive from now on."""
@@ -43,14 +43,14 @@ class Behaviour(Protocol):
 
 
 def behaviour(scene: Scene, index: int, idle: str, manoeuvre: str) -> Behaviour:
-    """The behaviour of a body, by how it started."""
+    """The behaviour of a body, by its start."""
     if scene.starts[index].approach is None:
         return Walker(scene, index, idle)
     return Driver(scene, index, idle, manoeuvre)
 
 
 class Idle(Protocol):
-    """What a walker does while its behaviour is inactive."""
+    """The actions of a pedestrian while its behaviour is inactive."""
 
     def action(self, state: BodyState) -> Action: ...
 
@@ -63,7 +63,7 @@ class DoNothing:
 
 
 def idling(name: str, scene: Scene, index: int) -> Idle:
-    """The idle behaviour of that name for a walker."""
+    """The idle behaviour of that name for a pedestrian."""
     if name == "pavement":
         return Stroll(scene, index)
     if name == "kerb":
@@ -72,7 +72,7 @@ def idling(name: str, scene: Scene, index: int) -> Idle:
 
 
 class Walker:
-    """Crosses the road, and keeps out of others before, meanwhile and after."""
+    """Crosses the road, and avoids other bodies before, meanwhile and after."""
 
     def __init__(self, scene: Scene, index: int, idle: str) -> None:
         self.scene, self.index = scene, index
@@ -93,7 +93,7 @@ class Walker:
     def begin(self, state: BodyState) -> bool:
         if not self._crossing.begin(state):
             return False
-        self._idle = DoNothing()  # beyond the road nothing of the start holds
+        self._idle = DoNothing()  # beyond the road the data of the start no longer hold
         self._avoidance.rest()
         return True
 

@@ -1,9 +1,9 @@
 """A tester that learns how the ego drives, and plays the best response to it.
 
-It counts when the ego changes its acceleration and what it takes then (``planning.opponent``),
-solves the decision process that these counts make (``planning.solving``), and at every timestep
-does what is worth more from where things really are: to walk, or to stand. First it explores, with
-walks that are timed at random; then it plays, and solves anew every now and then.
+It counts when the ego changes its acceleration and to which value (``planning.opponent``), solves
+the decision process that follows from the counts (``planning.solving``), and in every timestep
+takes the action with the larger value from the true state: to walk, or to stand. First it explores,
+with walks at random times; then it plays, and solves again at intervals.
 """
 
 from __future__ import annotations
@@ -47,10 +47,10 @@ from cavsumo.model.snapshot import BodyState, Snapshot
 
 MODEL_DT = 0.1  # timestep of the model, unless those of the scenario are longer [s]
 AIMS = ("violation", "test")
-EXPLORED_AIMS = (0.3, 1.3)  # how far into the reaction zone walks that explore step
-INDIFFERENT = 0.02  # a move is kept unless another is worth more by this
-OFF_THE_LANE_S = 1.1  # who stands no nearer stops nobody
-SLOW_MPS = 0.5  # who goes back brakes to this speed before turning
+EXPLORED_AIMS = (0.3, 1.3)  # part of the reaction zone into which exploring walks step
+INDIFFERENT = 0.02  # a move is kept unless another is better by this
+OFF_THE_LANE_S = 1.1  # a body that stands farther away does not stop the ego
+SLOW_MPS = 0.5  # a body that goes back brakes to this speed before turning
 BACK = 2  # to where it waited, when there is nothing to be had; the model knows nothing of it
 KNOWN = "best-response"
 
@@ -65,7 +65,7 @@ def _planned(counts: str, dt: float, aim: Aim) -> Plan:
 
 @AGENTS.register(KNOWN)
 class BestResponseAgent(Agent):
-    """Counts how the ego drives, solves the game against that ego, and plays its solution."""
+    """Counts how the ego drives, solves the game against that ego, and plays the solution."""
 
     sees_background = False
     drives = False
@@ -133,19 +133,19 @@ class BestResponseAgent(Agent):
         self.plan = _planned(self.planned, dt, self.aim) if self.planned else None
         self.watch = AccelerationReader(dt)
         self.coordinates = [Coordinates(scene, i) for i in range(len(scene.bodies))]
-        self._pupils = [Pupil(self, i) for i in self.owned]
+        self._bodies = [PlannedBody(self, i) for i in self.owned]
         self._told: tuple[int, int, int] | None = None
 
     def choose_action(self, snapshot: Snapshot) -> tuple[Action, ...]:
         if snapshot.step % self._every == 0:
             self._look(snapshot)
         return tuple(
-            pupil.action(snapshot, state)
-            for pupil, state in zip(self._pupils, self.own(snapshot), strict=True)
+            body.action(snapshot, state)
+            for body, state in zip(self._bodies, self.own(snapshot), strict=True)
         )
 
     def _look(self, snapshot: Snapshot) -> None:
-        """See what the ego did, and count it in the situation in which it was."""
+        """Observe the ego's last decision, and count it in its situation."""
         if not snapshot.sees_ego:
             self.watch, self._told = AccelerationReader(self.watch.dt), None
             return
@@ -158,7 +158,7 @@ class BestResponseAgent(Agent):
         self._told = self._situation(snapshot)
 
     def _situation(self, snapshot: Snapshot) -> tuple[int, int, int]:
-        """What explains the ego best: the body on its way for which it must brake hardest."""
+        """The situation of the ego: that of the body for which it must brake hardest."""
         worst, need = (math.inf, math.inf), 0.0
         for coordinates in self.coordinates:
             here = coordinates(snapshot)
@@ -176,7 +176,7 @@ class BestResponseAgent(Agent):
 
 
 def entry_time(kind: Kind, here: Relative, dt: float) -> float:
-    """Until a body that walks from now on enters the ego's strip; since it did, below 0 [s].
+    """Time until a body that walks from now on enters the ego's strip, negative since then [s].
 
     A body that gains speed is half a timestep late: its position uses the old speed.
     """
@@ -185,7 +185,7 @@ def entry_time(kind: Kind, here: Relative, dt: float) -> float:
     return time_to_walk(kind, here.walk, here.left) + dt / 2.0 * (1.0 - here.walk / kind.v_max)
 
 
-class Pupil:
+class PlannedBody:
     """One body of the agent: waits before the kerb, walks, may stop before the lane and go back."""
 
     def __init__(self, agent: BestResponseAgent, index: int) -> None:
@@ -208,7 +208,7 @@ class Pupil:
         return self.avoidance.along(snapshot, state, wanted)
 
     def _wanted(self, snapshot: Snapshot, state: BodyState) -> Action:
-        """The next action if nobody is in the way."""
+        """The next action if no body is in the way."""
         if self.begun and not self.crossing.active:
             return NOOP  # it has arrived on the other side
         move = self.last = self._move(snapshot, state)
@@ -247,7 +247,7 @@ class Pupil:
         return self._best(plan, here, entry)
 
     def _committed(self, here: Relative, kind: Kind) -> int:
-        """Nearer than decisions are planned: what was begun is brought to its end."""
+        """Whether the body is nearer than decisions are planned, so that it completes its move."""
         if not self.begun:
             return STAND
         room = here.walk * (here.walk / (-2.0 * kind.throttle_min) + self.scene.dt)
@@ -256,7 +256,7 @@ class Pupil:
         return BACK
 
     def _best(self, plan: Plan, here: Relative, entry: float) -> int:
-        """The move that is worth most. Farther away the ages shift along."""
+        """The move with the largest value. Farther away the ages shift along."""
         grid, watch, gap = plan.grid, self.agent.watch, here.gap
         zeta = (gap - here.v * entry * grid.dt - braking(here.v)) / float(scale(here.v))
         if not ZETAS[0] < zeta < ZETAS[-1]:
@@ -277,7 +277,7 @@ class Pupil:
         return int(np.argmax(worth))
 
     def _aside(self, state: BodyState) -> float:
-        """How much farther along the ego's path a body is than its way, after its turns [m]."""
+        """Offset of a body from its way along the ego's path, after its turns [m]."""
         met = self.coordinates.meeting
         assert met is not None
         heading = met.way.heading

@@ -1,9 +1,9 @@
-"""How one body carries out the policy of a solved game, re-planned at every timestep.
+"""The policy of one body from a solved game, planned again at every timestep.
 
-It goes to the kerb and waits there as long as it can go later just as surely: late tests leave the
-ego less time to react, and least of the road is used. Once on the road it walks on, or stands
-while going on would spoil the test. In the ego's way it stands, until the ego has
-passed or has stopped; then it goes on to the other side.
+The body goes to the kerb and waits there as long as a later start is equally sure: late tests leave
+the ego less time to react, and use little of the road. On the road it walks on, or stands while
+walking on would spoil the test. In the ego's way it stands until the ego has passed or has stopped;
+then it walks to the other side.
 """
 
 from __future__ import annotations
@@ -19,20 +19,20 @@ from cavsumo.model.kinematics import step_floats
 from cavsumo.model.scene import Scene
 from cavsumo.model.snapshot import BodyState, Snapshot
 
-PASSED_M = 1.0  # how far behind the body the ego's rear must be to be no danger any more
+PASSED_M = 1.0  # an ego whose rear is so far beyond the body is no longer a danger
 
 
 class BodyPolicy:
     """The policy of one body; begin a new one for each episode.
 
     Args:
-        forceabilities: the class of egos it plays against; behind it those that it falls back on
-            where nothing can be forced against that one.
-        escape: a heading relative to the way across on which it goes at once, for bodies that
-            come too late on the straight way [rad]; None for the policy.
+        forceabilities: that of the class of egos it plays against, followed by those of classes
+            that it falls back on if it can force nothing against that one.
+        escape: a heading relative to the way across on which it starts at once, for bodies that
+            arrive too late on the straight way [rad]; None for the policy.
 
     Attributes:
-        going: whether it has left the kerb for good.
+        going: whether it has finally left the kerb.
     """
 
     def __init__(
@@ -56,20 +56,20 @@ class BodyPolicy:
         return (way.heading if way else self.scene.starts[self.index].o) + (self.escape or 0.0)
 
     def sure(self, snapshot: Snapshot) -> bool:
-        """Whether the goal is sure from here, against the class of egos or one fallen back on."""
+        """Whether the goal is sure from here, against the class of egos or a fallback."""
         here = self.where(snapshot)
         return here is not None and any(o.sure(here) for o in self.forceabilities)
 
     def lost(self, snapshot: Snapshot) -> bool:
-        """Whether this body will not come to a test any more."""
+        """Whether this body can no longer reach a test."""
         here = self.where(snapshot)
         if here is None or here.gap < self._passed:
             return True
         return here.left > 0.0 and not self.forceabilities[-1].possible(here)
 
     def due(self, snapshot: Snapshot, idle: Action) -> float:
-        """How much is to be gained by going now instead of idling: 1 where the test is sure now and
-        would not be any more, something above 0 where it is uncertain, else 0.
+        """The gain of starting now instead of idling: 1 if the test is sure now and would not be
+        sure later, between 0 and 1 if it is uncertain, else 0.
         """
         here = self.where(snapshot)
         if here is None:
@@ -86,18 +86,18 @@ class BodyPolicy:
         return max(0.0, min(0.5, last.worth(here) - last.worth(after)))
 
     def idle(self, snapshot: Snapshot) -> Action:
-        """What it does before it goes."""
+        """The action before the start."""
         return self.kerb.action(snapshot.testers[self.index])
 
     def go(self, snapshot: Snapshot) -> Action:
-        """What it does from then on."""
+        """The action from the start on."""
         state, here, dt = snapshot.testers[self.index], self.where(snapshot), self.scene.dt
         met = self.where.meeting
         assert here is not None
         assert met is not None
         heading, top = met.way.heading, state.body.kind.v_max
         over = here.left < -met.width
-        # An ego that stands is of no class: waiting for it could go on for ever.
+        # An ego that stands belongs to no class: waiting for it could take for ever.
         if over or here.gap < self._passed or here.v <= LEAST_MPS:
             there = met.way.progress(state.x, state.y) >= met.way.length
             return walk(state, heading, 0.0 if there else top, dt)

@@ -1,4 +1,5 @@
-"""How a vehicle drives: along lanes by pure pursuit, slowly round bends, behind whoever is ahead.
+"""Driving of a vehicle: along lanes by pure pursuit, slowly in bends, at a distance to bodies
+ahead.
 
 Every movement is an action of the body's two effectors; nothing here moves a body by itself.
 
@@ -27,21 +28,21 @@ LATERAL_MPS2 = 2.5  # acceleration sideways that bounds the speed in bends
 GAINING_MPS2 = 2.5  # throttle of a calm driver
 BRAKING_MPS2 = 3.0  # its brake, where it sees the reason in time
 HARDEST_MPS2 = 9.0  # brake that others are taken to have
-HASTE_MPS2 = 4.0  # throttle of one who must get through
+HASTE_MPS2 = 4.0  # throttle of a driver who does not give way
 LOOK_S = 0.4  # the point pursued lies so far ahead, in seconds of the way
 NEAREST_LOOK = 0.5  # but no nearer than this many wheelbases
 NEAREST_LOOK_M = 2.0
-SEEN_M = 40.0  # who is farther away is not looked at
-KEEP_M = 2.0  # gap kept to who stands ahead
-BESIDE_M = 0.3  # room beside a body that one drives past
+SEEN_M = 40.0  # bodies farther away are ignored
+KEEP_M = 2.0  # gap kept to a standing body ahead
+BESIDE_M = 0.3  # distance at the side of a body that is passed
 PATIENCE_S = 12.0  # a drive is not foreseen for longer
-RUN_OUT_M = 12.0  # so far behind the end of its path a vehicle has left the road
+RUN_OUT_M = 12.0  # a vehicle so far beyond the end of its path has left the road
 
 
 class Course:
     """A path as one body drives along it.
 
-    Arc lengths are those of the body's centre; behind the end the path goes straight on.
+    Arc lengths are those of the body's centre; beyond its end the path is straight.
 
     Args:
         top: speed limit on the path [m/s].
@@ -62,7 +63,7 @@ class Course:
         return self._last[1], self._last[2]
 
     def _prolonged(self, here: Projection, state: BodyState) -> tuple[float, float]:
-        """Arc length and lateral offset; behind its end the path goes straight on [m]."""
+        """Arc length and lateral offset; beyond its end the path is straight [m]."""
         if here.along < self.path.length:
             return here.along, here.lateral
         x, y, o = self.path.at(self.path.length)
@@ -100,9 +101,9 @@ class Course:
     def time_to(
         self, state: BodyState, there: float, gaining: float = HASTE_MPS2
     ) -> tuple[float, float]:
-        """When a body that drives on at once is at an arc length, and how fast [s, m/s].
+        """Time and speed at which a body that drives on at once reaches an arc length [s, m/s].
 
-        No later than PATIENCE_S; as the kinematics, with the old speed for the position.
+        At most PATIENCE_S; as in the kinematics, with the old speed for the position.
         """
         along, v, time, dt = self.place(state)[0], state.v, 0.0, self.dt
         while along < there and time < PATIENCE_S:
@@ -132,7 +133,7 @@ class Course:
 
 
 def look_ahead(kind: Kind, v: float, dt: float) -> float:
-    """How far ahead the point pursued lies [m]."""
+    """Distance of the pursued point ahead [m]."""
     return max(NEAREST_LOOK * kind.wheelbase, NEAREST_LOOK_M, max(LOOK_S, 2.0 * dt) * v)
 
 
@@ -141,7 +142,7 @@ def steer_at(state: BodyState, x: float, y: float) -> float:
     kind = state.body.kind
     dx, dy = x - state.x, y - state.y
     alpha = math.remainder(math.atan2(dy, dx) - state.o, math.tau)
-    # A point behind is out of reach: turn towards it as sharply as can be.
+    # A point behind is out of reach: turn towards it at full steering.
     room = math.hypot(dx, dy) / kind.wheelbase + math.cos(alpha)
     wanted = math.atan2(2.0 * math.sin(alpha), max(room, 0.0))
     return min(kind.steering_max, max(-kind.steering_max, wanted))
@@ -150,9 +151,9 @@ def steer_at(state: BodyState, x: float, y: float) -> float:
 def stopping_from(distance: float, onward: float, dt: float) -> float:
     """The largest speed from which a body still stops in time [m/s].
 
-    That is within a distance, behind who is that far ahead at the speed ``onward`` and may brake
-    as hard as can be: v^2 / (2 b) + v dt <= distance + onward^2 / (2 HARDEST_MPS2), the calm
-    driver's brake for b.
+    The distance is that to a body ahead at the speed ``onward``, which may brake with HARDEST_MPS2:
+    v^2 / (2 b) + v dt <= distance + onward^2 / (2 HARDEST_MPS2), with the calm driver's brake for
+    b.
     """
     b, way = BRAKING_MPS2, distance + onward * onward / (2.0 * HARDEST_MPS2)
     if way <= 0.0:
@@ -161,7 +162,7 @@ def stopping_from(distance: float, onward: float, dt: float) -> float:
 
 
 def extent(body: BodyState, axis: float) -> tuple[float, float]:
-    """How far a body's box reaches from its centre along an axis and across it [m]."""
+    """Extent of a body's box from its centre along an axis and across it [m]."""
     kind, turn = body.body.kind, body.o - axis
     c, s = abs(math.cos(turn)), abs(math.sin(turn))
     return (kind.length * c + kind.width * s) / 2, (kind.length * s + kind.width * c) / 2
@@ -171,8 +172,8 @@ def extent(body: BodyState, axis: float) -> tuple[float, float]:
 def speed_limits(path: Path, top: float) -> tuple[float, ...]:
     """The largest speed at each metre of a path [m/s].
 
-    In a bend of radius R at most sqrt(LATERAL_MPS2 R), and before it no more than what
-    BRAKING_MPS2 brings down to that.
+    In a bend of radius R at most sqrt(LATERAL_MPS2 R), and before it at most the speed from which
+    BRAKING_MPS2 reaches that limit in time.
     """
     marks = range(math.ceil(path.length) + 1)
     bends = (max(1e-9, path.curvature(float(s))) for s in marks)

@@ -73,7 +73,7 @@ class ElectionAgent(ProgrammedAgent):
 class Coordinator:
     """The seed's coordinator c: one election a timestep, none while the winner crosses.
 
-    With a sensor there is one for each agent, by what it sees: they may not agree.
+    With a sensor there is one for each agent, by its own view; they may disagree.
     """
 
     def __init__(self, agents: Sequence[ElectionAgent], rng: np.random.Generator) -> None:
@@ -82,7 +82,7 @@ class Coordinator:
         self._winner: int | None = None
 
     def elected(self, snapshot: Snapshot) -> int | None:
-        """The index of the body elected in this timestep, ties drawn; None when nobody is."""
+        """The index of the body elected in this timestep, ties drawn; None without a winner."""
         if snapshot is not self._seen:
             self._seen = snapshot
             self._winner = self._elect(snapshot)

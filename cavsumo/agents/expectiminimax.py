@@ -1,6 +1,6 @@
-"""The game-playing tester: a solved game says when and whether to step into the road.
+"""The game-playing tester: a solved game decides whether and when to step onto the road.
 
-It says of every episode beforehand whether its test can be forced, and against which egos.
+It predicts for every episode whether its test can be forced, and for which egos.
 """
 
 from __future__ import annotations
@@ -27,14 +27,15 @@ from cavsumo.model.scene import Scene
 from cavsumo.model.snapshot import Snapshot
 
 NEAR_M, FAR_M = 3.0, 6.0  # how far from the strip the tables begin: of free and of constant egos
-# Ways that are tried at once where the straight one takes too long, off the way across [rad].
+# Headings of ways that are tried at once if the straight one takes too long, off the way across
+# [rad].
 ESCAPES = tuple(math.radians(sign * turn) for turn in range(5, 75, 5) for sign in (1, -1))
 TURNING_S = 0.5  # no more is gained by turning less at first
 
 
 @AGENTS.register("expectiminimax")
 class ExpectiminimaxAgent(Agent):
-    """Plays the optimal policy of a stochastic shortest path game; says what it guarantees."""
+    """Plays the optimal policy of a stochastic shortest path game, with a forecast."""
 
     sees_background = False
     drives = False
@@ -116,9 +117,9 @@ class ExpectiminimaxAgent(Agent):
             agent.team = team
 
     def _send(self, snapshot: Snapshot, idle: Sequence[Action | None]) -> None:
-        """Let one body go, if it is time and no other is on its way to a test.
+        """Let one body start, if it is time and no other is on its way to a test.
 
-        One that is not sure to succeed waits while another is.
+        A body that is not sure to succeed waits while another is.
         """
         if any(t.going and not t.lost(snapshot) for t in self.team):
             return
@@ -132,7 +133,7 @@ class ExpectiminimaxAgent(Agent):
             self.policies[-n].going = True
 
     def _simulated_ahead(self, snapshot: Snapshot) -> str:
-        """The verdict of episodes played in the head; the way that succeeds is the one taken."""
+        """The verdict of episodes simulated ahead; the agent takes the way that succeeds."""
         scene = self.scene
         for n, i in enumerate(self.owned):
             for turn in (None, *self._escapes(snapshot, i)):
@@ -142,8 +143,8 @@ class ExpectiminimaxAgent(Agent):
         return NOT_FORCEABLE
 
     def _escapes(self, snapshot: Snapshot, index: int) -> tuple[float, ...]:
-        """Oblique ways worth trying [rad]: none where the straight one is late by more than the
-        best of them gains.
+        """Oblique ways to try [rad]: none if the straight one is late by more than the best of them
+        gains.
 
         On a way at phi to the straight one a body at speed w gains d tan(phi) of the ego's way and
         loses d (1 / cos(phi) - 1) / w of its time: at best d / w (1 - sqrt(1 - (w / v)^2)).
@@ -164,7 +165,7 @@ class ExpectiminimaxAgent(Agent):
         return ESCAPES
 
     def _lead(self, n: int, escape: float | None) -> None:
-        """Let one body play alone as long as it can come to a test."""
+        """Let one body play alone as long as it can reach a test."""
         self.leader = self.policies[n]
         self.leader.escape, self.leader.going = escape, escape is not None
 
@@ -185,7 +186,7 @@ class ExpectiminimaxAgent(Agent):
         return [free, constant]
 
     def _forceabilities_of(self, index: int) -> tuple[Forceability, ...]:
-        """How one body judges its chances."""
+        """The forceabilities of one body, those of its class first."""
         scene, tables = self.scene, [solved(rules) for rules in self._rules()]
         kind = scene.bodies[index].kind
         found: list[Forceability] = [ConstantSpeed(kind, tables[-1], MAX_DECEL, scene.dt)]

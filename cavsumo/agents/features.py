@@ -1,4 +1,4 @@
-"""What the Q-learning tester looks at: one body against the ego, after a look-ahead.
+"""The features of the Q-learning tester: one body against the ego, after a look-ahead.
 
 The ego is expected to keep its speed along its path; the body is expected to follow the target.
 """
@@ -25,13 +25,13 @@ TARGETS: tuple[tuple[bool, float], ...] = (
 
 
 def across(scene: Scene, index: int) -> float:
-    """The heading of a body's way across the road, where there is none that of its start [rad]."""
+    """The heading of a body's way across the road, or that of its start if there is none [rad]."""
     way = scene.way(index)
     return way.heading if way else scene.starts[index].o
 
 
 def towards(state: BodyState, way: float, target: int, dt: float) -> Action:
-    """Throttle and steering towards one of TARGETS, where ``way`` is what ``across`` says."""
+    """Throttle and steering towards one of TARGETS, where ``way`` is the result of ``across``."""
     moving, turn = TARGETS[target]
     return walk(state, way + turn if moving else state.o, moving * state.body.kind.v_max, dt)
 

@@ -1,7 +1,7 @@
-"""An episode played in the head: against an ego that keeps its speed everything is known before.
+"""An episode simulated ahead: against an ego that keeps its speed all states are known in advance.
 
-Exact where the ego keeps to its path and goes straight as it meets the body; curved zones, which
-follow its steering, are not foreseen.
+It is exact if the ego follows its path and drives straight when it meets the body; curved zones,
+which follow its steering, are not predicted.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from cavsumo.model.stopping_zones import zone_entered
 
 
 def succeeds(scene: Scene, snapshot: Snapshot, policy: BodyPolicy) -> bool:
-    """Whether a body that plays alone enters the reaction zone first, by a fresh policy."""
+    """Whether a body that plays alone enters the reaction zone first, by a new policy."""
     path, ego = scene.ego_path, snapshot.ego
     if ego.v <= 0.0:
         return False

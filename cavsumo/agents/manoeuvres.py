@@ -1,8 +1,8 @@
-"""What a programmed vehicle does: lawful until it is triggered, then its manoeuvre.
+"""The behaviour of a programmed vehicle: lawful until it is triggered, then its manoeuvre.
 
-Lawful: it follows its lanes, keeps its distance to everybody and waits where its way meets the
-ego's: for good, unless it is triggered. It takes its time to get there, so as to be still rolling
-when the ego comes. On the ego's lane and beside it, it keeps the speed with which it started.
+Lawful: it follows its lanes, keeps its distance to all bodies and, unless it is triggered, waits
+where its way meets the ego's. It approaches slowly, so as to be still moving when the ego arrives.
+On the ego's lane and beside it, it keeps the speed with which it started.
 """
 
 from __future__ import annotations
@@ -20,21 +20,21 @@ from cavsumo.model.snapshot import BodyState, Snapshot
 from cavsumo.model.zone_presence import drift
 
 MANOEUVRES = ("auto", "run", "brake", "cut-in")
-CREEPING_MPS = 2.0  # a lawful vehicle goes no slower than this to where it waits
+CREEPING_MPS = 2.0  # a lawful vehicle drives to its waiting point at least at this speed
 STANDS_S = 3.0  # one that braked drives on after this time
 NOTICE_S = 0.7  # an ego that follows is taken to notice a brake light after this time
-STANDING_M = 2.5  # and to come to a stand so far behind
+STANDING_M = 2.5  # and to stop so far behind
 CUT_IN_LOOK_M = 7.0  # how gently it changes lanes: the distance of the point pursued
 SLOWED = 0.7  # speed after cutting in, as a share of the one before
-SQUEEZE_M = 20.0  # a lane beside the ego's that ends so soon after leaving it ends beside it
-STOPPING_M = 30.0  # so far before the end of its way it minds that again
-ARRIVED_M = 0.3  # so near the axis of a lane one is on it
+SQUEEZE_M = 20.0  # a lane that ends so soon after leaving the ego's ends beside it
+STOPPING_M = 30.0  # so far before the end of its way it considers the end again
+ARRIVED_M = 0.3  # a body so near the axis of a lane is on it
 MOVING_OFF = 0.7  # an ego slower than this share of its speed limit that gains speed moves off
 FAR_M = 30.0  # a run that leads into the ego's lane has ended after this
 
 
 class EgoPrediction:
-    """Where the ego will be: at the speed that it has, or gaining speed while it moves off."""
+    """Predicted positions of the ego: at its current speed, or gaining speed while it moves off."""
 
     def __init__(self, scene: Scene, limit: float) -> None:
         self.scene, self.limit = scene, limit
@@ -61,7 +61,7 @@ class Manoeuvre:
     """One manoeuvre of one vehicle.
 
     Attributes:
-        course: what the vehicle drives along, before or after.
+        course: the course of the vehicle, before and after.
     """
 
     types: ClassVar[tuple[str, ...]]  # of approach on which it is possible
@@ -85,7 +85,7 @@ class Manoeuvre:
         return False
 
     def gap(self, ego: EgoPrediction, state: BodyState) -> tuple[float, float] | None:
-        """Room that an ego which drives on has left on meeting a vehicle that begins now [m].
+        """Gap that an ego which drives on has left on meeting a vehicle that begins now [m].
 
         With it the ego's speed then [m/s]. Measured as the stopping zones count vehicles
         (``zone_presence``). None when they will not meet.
@@ -94,7 +94,7 @@ class Manoeuvre:
 
 
 class Run(Manoeuvre):
-    """Drives on across or into the ego's way, whatever light or sign it has, and whoever comes."""
+    """Drives on across or into the ego's way, against lights, signs and other traffic."""
 
     types = ("crossing", "merging")
 
@@ -187,7 +187,7 @@ def manoeuvre_on(name: str, type_: str) -> type[Manoeuvre] | None:
 
 
 def types_for(name: str) -> tuple[str, ...]:
-    """The types of approach on which a manoeuvre is possible; none in particular for "auto"."""
+    """The types of approach on which a manoeuvre is possible; empty for "auto"."""
     return () if name == "auto" else KNOWN[name].types
 
 
@@ -195,7 +195,7 @@ class Driver:
     """The behaviour of a programmed vehicle (``behaviours.Behaviour``).
 
     Args:
-        idle: "noop" does nothing until it is triggered; anything else drives lawfully.
+        idle: "noop" does nothing until it is triggered; any other word drives lawfully.
         name: one of MANOEUVRES. A vehicle on an approach on which that is impossible drives
             lawfully throughout.
     """
@@ -211,9 +211,9 @@ class Driver:
         chosen = manoeuvre_on(name, approach.type)
         self.manoeuvre = chosen(scene, approach, self.course) if chosen else None
         self.active = self._begun = False
-        # Beyond the end of a road nobody in SUMO sees a body. There it is out of the way of all but
-        # those behind it, so who drives ahead of the ego stops before.
-        # So does who drives beside it: where its lane ends it may well be squeezed into the ego's.
+        # Beyond the end of a road SUMO's drivers do not see a body. There it is out of the way of
+        # all but those behind it, so a vehicle ahead of the ego stops before that. So does a
+        # vehicle beside it: where its lane ends it may be pushed into the ego's.
         self._run_out = RUN_OUT_M if waits else -kind.length / 2
         beside = not waits and math.isfinite(approach.leave)
         if beside and approach.path.length - approach.leave < SQUEEZE_M:
@@ -240,7 +240,7 @@ class Driver:
         return max(CREEPING_MPS, (self.approach.enter - here) * ego.v / way)
 
     def begin(self, state: BodyState) -> bool:
-        """Begin the manoeuvre; False when there is none, or it is too late, or it has been."""
+        """Begin the manoeuvre; False when there is none, it is too late, or it has begun before."""
         if self.manoeuvre is None or self._begun or not self.manoeuvre.possible(state):
             return False
         self.manoeuvre.begin(state)
@@ -289,7 +289,7 @@ class Arrival:
 
 
 def everybody(snapshot: Snapshot, but: BodyState, *, ego: bool = True) -> Iterator[BodyState]:
-    """All bodies seen but one, the ego among them if wanted."""
+    """All visible bodies but one, with the ego if wanted."""
     unseen = snapshot.unseen
     for other in snapshot.testers:
         if other is not but and not (unseen and other.id in unseen):

@@ -1,4 +1,4 @@
-"""What a learning tester is shown: one flat vector of numbers for a team of bodies.
+"""The observation of a learning tester: one flat vector of numbers for a team of bodies.
 
 The numbers are those that decide a test, in coordinates in which all roads look alike. A body has
 a *way* into the strip that the ego sweeps: on foot straight at the ego's path, from the side on
@@ -9,7 +9,7 @@ entry                        unit   meaning
 ============================ ====== ============================================================
 ``ego.speed_mps``            m/s    the ego's speed
 ``ego.steering_rad``         rad    its steering angle, positive to the left
-``ego.left_m``               m      what is left of its path, from its front
+``ego.left_m``               m      length of its path ahead of its front
 ``bodyI.ahead_m``            m      from the ego's front, along its path, to the near side of the
                                     I-th owned body where it enters the strip; negative behind
 ``bodyI.strip_m``            m      way of that body's front to the strip; negative in and beyond it
@@ -86,7 +86,7 @@ def entries(bodies: int, v_max: float, steering_max: float) -> tuple[Bounds, ...
 
 
 class TeamObserver:
-    """Shows the snapshots of one episode to the owner of some bodies; made anew at each reset.
+    """Observations of one episode for the owner of some bodies; made anew at each reset.
 
     Attributes:
         names: of the entries.
@@ -107,7 +107,7 @@ class TeamObserver:
         self._mine, self._theirs = [ways[i] for i in self._team], [ways[i] for i in self._others]
 
     def vector(self, snapshot: Snapshot) -> NDArray[np.float32]:
-        """What the team is shown of a snapshot: float32 of shape (len(names),)."""
+        """The team's observation of a snapshot: float32 of shape (len(names),)."""
         return np.array(self.values(snapshot), dtype=np.float32)
 
     def values(self, snapshot: Snapshot) -> list[float]:
@@ -158,7 +158,7 @@ Look = tuple[float, float, float, float, float]
 
 
 class _Way:
-    """How one body gets into the strip that the ego sweeps."""
+    """The way of one body into the strip that the ego sweeps."""
 
     def __init__(self, scene: Scene, index: int) -> None:
         self._scene, self._kind = scene, scene.bodies[index].kind
@@ -172,14 +172,15 @@ class _Way:
         self._origin, self._near = first.along, first.segment
 
     def on_path(self, state: BodyState) -> Projection:
-        """Where a body is relative to the ego's path."""
+        """Position of a body relative to the ego's path."""
         if self._projected is None or self._projected[0] is not state:
             here = self._scene.ego_path.project(state.x, state.y, self._near)
             self._near, self._projected = here.segment, (state, here)
         return self._projected[1]
 
     def look(self, state: BodyState) -> Look:
-        """Where the ego meets the body that goes its way now, and how the body lies to that way.
+        """The meeting of the ego with a body that goes its way now, and the body's pose on that
+        way.
 
         Arc length of its near side on the ego's path, way to the strip, heading of the way,
         distance beside it, on the carriageway or not (m and rad). Computed once for each state.
@@ -197,7 +198,7 @@ class _Way:
         here, kind, side = self.on_path(state), self._kind, self._side
         along = self._scene.ego_path.at(here.along)[2]
         strip = side * here.lateral - self._half_strip - kind.length / 2
-        # Who comes from the left of the path has the ego's direction to the left of his way.
+        # For a body from the left of the path the ego's direction is to the left of its way.
         offset = side * (here.along - self._origin)
         return here.along - kind.width / 2, strip, along - side * math.pi / 2, offset
 

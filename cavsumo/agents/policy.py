@@ -1,18 +1,18 @@
 """Testers that a user trained: ``policy:FILE``, the format is that of ``policy_file``.
 
-Such a tester goes wherever the name of a registered one does.
+Such a tester is accepted in every place of the name of a registered one.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from cavsumo.agents.base import AGENTS, Agent
 from cavsumo.agents.features import across, towards
+from cavsumo.agents.names import policy_file
 from cavsumo.agents.observations import TeamObserver
 from cavsumo.agents.policy_file import TrainedPolicy, read_policy
 from cavsumo.errors import InputError, UnknownName
@@ -21,8 +21,6 @@ from cavsumo.model.objects import factory_of, is_object
 from cavsumo.model.registry import Parameter, Registry
 from cavsumo.model.scene import Scene
 from cavsumo.model.snapshot import Snapshot
-
-PREFIX = "policy:"
 
 
 def make_agent(spec: str, params: Mapping[str, Any]) -> Agent:
@@ -38,7 +36,7 @@ def make_agent(spec: str, params: Mapping[str, Any]) -> Agent:
 
 
 def parameters_of(spec: str) -> list[Parameter]:
-    """The parameters of an agent; a policy has none, all that it is is in its file."""
+    """The parameters of an agent; a policy has none, its file defines it completely."""
     if is_object(spec):
         return _alone(spec).parameters(spec)
     return AGENTS.parameters(spec) if policy_file(spec) is None else []
@@ -59,17 +57,8 @@ def _alone(name: str) -> Registry[Agent]:
     return alone
 
 
-def policy_file(spec: str) -> Path | None:
-    """The file of ``policy:FILE``, None for any other name."""
-    if not spec.startswith(PREFIX):
-        return None
-    if spec == PREFIX:
-        raise InputError(f"agent {spec!r}: expected the file of a policy, {PREFIX}FILE")
-    return Path(spec.removeprefix(PREFIX))
-
-
 class PolicyAgent(Agent):
-    """A trained policy; it does the same in the same situation, and learns nothing."""
+    """A trained policy; it takes equal actions in equal situations, and does not learn."""
 
     sees_background = False
 

@@ -21,8 +21,8 @@ names of the entries, see ``observations``), ``bodies`` (how many one copy of th
 
 * "effectors": for each body throttle and steering in [-1, 1], what lies outside is clipped: from
   the lower to the upper limit of the effector;
-* "table": a score for each row of ``table``, the best (the first of them) wins; a row holds
-  throttle and steering for each body as above;
+* "table": a score for each row of ``table``; the first row with the best score is taken; a row
+  holds throttle and steering for each body as above;
 * "targets": for each body a score for each of ``agents.features.TARGETS``: to stand, or to walk at
   full speed along a heading relative to the way across the road. The body steers to it at full
   steering in every timestep. For pedestrians only.
@@ -50,12 +50,12 @@ from cavsumo.agents.observations import entries
 from cavsumo.errors import InputError
 from cavsumo.model.bodies import KINDS, WALKING
 
-LARGEST_B = 64 * 2**20  # no policy of ours needs more; what unpacks to more is none
+LARGEST_B = 64 * 2**20  # far more than a policy needs; a larger archive is refused
 Array = NDArray[np.float64]
 
 
 class Observed(BaseModel):
-    """Which observation a policy was trained on."""
+    """The observation on which a policy was trained."""
 
     model_config = ConfigDict(extra="forbid", frozen=True)
 
@@ -64,7 +64,7 @@ class Observed(BaseModel):
 
 
 class Header(BaseModel):
-    """What a policy file says of itself; the keys are explained in the module's docstring."""
+    """The header of a policy file; the module's docstring explains the keys."""
 
     model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
 
@@ -82,10 +82,10 @@ class Header(BaseModel):
 
 @dataclass(frozen=True, eq=False)
 class TrainedPolicy:
-    """A policy; ValueError says what does not fit together.
+    """A policy; ValueError for parts that do not fit together.
 
     Attributes:
-        header: what it is.
+        header: the header of the file.
         mean, scale: of the observation, shape (n,).
         layers: weights and biases of each layer.
         table: the actions to choose from, shape (choices, 2 * bodies), or None.
@@ -113,7 +113,7 @@ class TrainedPolicy:
         self._check_output(sizes[-1])
 
     def _check_output(self, size: int) -> None:
-        """Whether what comes out of the network can be taken for actions."""
+        """Check that the outputs of the network fit the actions."""
         bodies, actions = self.header.bodies, self.header.actions
         if (actions == "table") != (self.table is not None):
             raise ValueError('there is a table where actions is "table", and only there')
@@ -127,7 +127,7 @@ class TrainedPolicy:
             raise ValueError(f"the last layer has {size} outputs, {actions} need {expected}")
 
     def outputs(self, observation: NDArray[np.float32]) -> Array:
-        """What the network says, shape (outputs,), of an observation, shape (n,)."""
+        """The outputs of the network, shape (outputs,), for an observation, shape (n,)."""
         clip = self.header.clip
         x = np.clip((observation.astype(np.float64) - self.mean) / self.scale, -clip, clip)
         last = len(self.layers) - 1
@@ -186,7 +186,7 @@ def write_policy(file: Path, policy: TrainedPolicy) -> None:
 
 
 def _arrays(content: bytes) -> dict[str, NDArray[Any]]:
-    """The arrays of an archive; ValueError for whatever else it is."""
+    """The arrays of an archive; ValueError for any other file."""
     import zipfile
 
     try:
@@ -200,7 +200,7 @@ def _arrays(content: bytes) -> dict[str, NDArray[Any]]:
 
 
 def _assembled(arrays: Mapping[str, NDArray[Any]]) -> TrainedPolicy:
-    """The policy that the arrays of a file make."""
+    """The policy from the arrays of a file."""
     if "header" not in arrays or arrays["header"].dtype.kind != "U":
         raise ValueError("no policy: it has no header")
     try:
@@ -234,7 +234,7 @@ def _floats(name: str, array: NDArray[Any]) -> Array:
 
 
 def _check(name: str, array: Array, shape: Sequence[int]) -> None:
-    """Refuse another shape, and what is not finite."""
+    """Refuse another shape and numbers that are not finite."""
     if array.shape != tuple(shape):
         raise ValueError(f"{name} has the shape {array.shape}, expected {tuple(shape)}")
     if not np.isfinite(array).all():
@@ -242,7 +242,7 @@ def _check(name: str, array: Array, shape: Sequence[int]) -> None:
 
 
 def _check_header(header: Header) -> None:
-    """Refuse a policy that was trained on other observations, or on what there is not."""
+    """Refuse a policy that was trained on other observations or unknown kinds."""
     if header.kind not in KINDS:
         raise ValueError(f"kind {header.kind!r} is none of {', '.join(KINDS)}")
     if header.actions == "targets" and header.kind not in WALKING:

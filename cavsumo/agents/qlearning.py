@@ -149,8 +149,8 @@ class QLearningAgent(Agent):
 def total(values: Iterable[float]) -> float:
     """The sum from left to right, rounded after each term.
 
-    The built-in ``sum`` compensates the rounding of floats since Python 3.12, so what is learned
-    with it differs in the last digits from one version to another.
+    The built-in ``sum`` compensates the rounding of floats since Python 3.12, so weights learned
+    with it would differ in the last digits between versions.
     """
     found = 0.0
     for value in values:

@@ -1,8 +1,13 @@
-"""Again what was done before: actions that were chosen beforehand, whatever happens now."""
+"""Episodes that are played back: the testers begin where they began and do what they did.
+
+A record is made from an episode in memory (``simulation.playback``) or from its trace
+(``results.recording``), and played by agents of this file, independently of the ego.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -10,37 +15,90 @@ import numpy as np
 from cavsumo.agents.base import AGENTS, Agent
 from cavsumo.errors import NoSuchAction
 from cavsumo.model.bodies import NOOP, Action, Kind
+from cavsumo.model.carriageway import StartRecord
+from cavsumo.model.departures import Demand
 from cavsumo.model.kinematics import steering_for_turn, wrap
 from cavsumo.model.scene import Scene
 from cavsumo.model.snapshot import Snapshot
 
-Joint = Sequence[tuple[float, float]]  # throttle and steering of each owned body
+Teams = Sequence[Sequence[int]]  # for each agent the indices of its bodies
+
+
+@dataclass(frozen=True)
+class Recorded:
+    """Data that determine an episode when it is played back.
+
+    Attributes:
+        seed: of the episode.
+        actions: for each timestep the action of each tester's body.
+        starts: where each of them started; empty to draw the starts from the seed again.
+        waited: where they waited for the ego to enter, if some were put elsewhere after that.
+        departures: of the background; None for the scenario's own demand.
+        approaches: types of the site's approaches, among which the starts' places are numbered.
+    """
+
+    seed: int
+    actions: Sequence[Sequence[Action]]
+    starts: Sequence[StartRecord] = ()
+    waited: Sequence[StartRecord] = ()
+    departures: Demand | None = None
+    approaches: Sequence[str] = ()
+
+    def memories(self, teams: Teams) -> tuple[dict[str, Any], ...]:
+        """The knowledge of the agents that play it back, as plain data."""
+        return tuple(
+            {
+                "starts": [self.starts[i] for i in team if self.starts],
+                "waited": [self.waited[i] for i in team if self.waited],
+                "actions": [[joint[i] for i in team] for joint in self.actions],
+            }
+            for team in teams
+        )
+
+    def agents(self, teams: Teams) -> list[RecordedAgent]:
+        """The agents that play it back."""
+        agents = [RecordedAgent() for _ in teams]
+        for agent, memory in zip(agents, self.memories(teams), strict=True):
+            agent.remember(memory)
+        return agents
 
 
 @AGENTS.register("recorded")
 class RecordedAgent(Agent):
-    """Repeats the actions that it is told (``certify --open-loop``), then does nothing.
+    """Begins and acts as it is told (``certify --open-loop``), then does nothing.
 
-    It is told them as what it remembers: for each timestep the actions of its bodies.
+    It is told that as what it remembers, see ``Recorded.memories``.
     """
 
     sees_background = False
 
     def __init__(self) -> None:
-        self._chosen: list[tuple[Action, ...]] = []
+        self._actions: list[tuple[Action, ...]] = []
 
     def reset(self, scene: Scene, owned: Sequence[int], rng: np.random.Generator) -> None:
         super().reset(scene, owned, rng)
-        self._next = iter(self._chosen)
+        self._next = iter(self._actions)
 
     def choose_action(self, snapshot: Snapshot) -> tuple[Action, ...]:
         return next(self._next, (NOOP,) * len(self.owned))
 
     def recall(self) -> Any:
-        return self._chosen
+        return {
+            "starts": self.recorded_starts,
+            "waited": self.recorded_waits,
+            "actions": self._actions,
+        }
 
-    def remember(self, memory: Sequence[Joint]) -> None:
-        self._chosen = [tuple(Action(*action) for action in joint) for joint in memory]
+    def remember(self, memory: Mapping[str, Any]) -> None:
+        self.recorded_starts, self.recorded_waits = (
+            [start_of(start) for start in memory[key]] for key in ("starts", "waited")
+        )
+        self._actions = [tuple(Action(*one) for one in joint) for joint in memory["actions"]]
+
+
+def start_of(plain: Sequence[Any]) -> StartRecord:
+    """A start from a list of its fields."""
+    return StartRecord(*plain)._replace(edges=tuple(plain[-1]))
 
 
 def action_between(
@@ -48,8 +106,8 @@ def action_between(
 ) -> tuple[float, float]:
     """Throttle and steering that lead a body from one state (x, y, v, o) to the next (eqs 20-22).
 
-    A speed at its limit comes from the effector at its limit, so that it is met exactly; where a
-    turn is lost in rounding there is none.
+    A speed at its limit comes from the effector at its limit, so that it is reproduced exactly; a
+    turn below the rounding error is none.
     """
     _, _, v, o = before
     _, _, v_next, o_next = after

@@ -1,9 +1,9 @@
-"""Nobody leaves the pavements but for a carriageway: for testers whose actions would lead anywhere.
+"""Keeping pedestrians with arbitrary actions on the pavements until they step onto a carriageway.
 
-A tester that draws its actions at random, or is still learning what they are good for, would walk
-over gardens and through houses, which no network shows. Until its body has stepped out it takes an
-action only if, stopping after it, the body would still be on a pavement, walking area, crossing or
-lane; else it turns to walk along the axis of its pavement.
+A tester that draws its actions at random, or has not yet learned their effects, would walk through
+gardens and houses, which networks do not contain. Until its body has stepped out it takes an action
+only if, stopping after it, the body would still be on a pavement, walking area, crossing or lane;
+else it turns to walk along the axis of its pavement.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ class Staying:
         self.onward = 1.0 if start.forwards else -1.0
 
     def action(self, state: BodyState, wanted: Action) -> Action:
-        """The action wanted, or a turn along the pavement where that leads off the ground."""
+        """The wanted action, or a turn along the pavement if that leads off the ground."""
         roads, pavement = self.scene.roads, self.pavement
         self.free = self.free or roads is None or roads.contains(state.x, state.y)
         if self.free or pavement is None:

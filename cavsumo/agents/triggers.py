@@ -30,7 +30,7 @@ def ego_distance(snapshot: Snapshot, state: BodyState) -> float:
 
 
 def distance_ahead(snapshot: Snapshot, state: BodyState) -> float:
-    """How far ahead of the ego a body is, negative behind it [m]."""
+    """Distance of a body ahead of the ego, negative behind it [m]."""
     ego = snapshot.ego
     return (state.x - ego.x) * math.cos(ego.o) + (state.y - ego.y) * math.sin(ego.o)
 
@@ -54,8 +54,8 @@ class Timing:
     with d_b and d_r the lengths of the braking and the reaction zone (and a margin to d_b).
 
     Args:
-        aim: how far into the reaction zone to wait, in (0, 1]: 1 steps in as its far end arrives,
-            small values as its near end does, for egos that brake before the zone is entered.
+        aim: part of the reaction zone into which to step, in (0, 1]: 1 when its far end arrives,
+            small values when its near end does, for egos that brake before the zone is entered.
     """
 
     def __init__(self, scene: Scene, index: int, aim: float) -> None:
@@ -115,7 +115,7 @@ class Timing:
         return self._last[1]
 
     def _time_to_enter(self, state: BodyState, way: Crossing) -> float | None:
-        """How long a body that goes now takes to the ego's strip [s]; None beyond its edge."""
+        """Time that a body that starts now takes to the ego's strip [s]; None beyond its edge."""
         left = self.strip - way.progress(state.x, state.y)
         if left <= 0.0:
             return None

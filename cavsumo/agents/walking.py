@@ -1,4 +1,4 @@
-"""How a body walks: along its pavement, up to the kerb, across the road. Used by the agents.
+"""Walking: along the pavement, up to the kerb, across the road. Used by the agents.
 
 Every movement is an action of the body's two effectors; nothing here moves a body by itself.
 """
@@ -15,7 +15,7 @@ from cavsumo.model.snapshot import BodyState
 
 ALIGNED_RAD = 1e-6  # a heading this close to its target has reached it
 KERB_CLEARANCE_M = 0.1  # distance kept to the carriageway while waiting at the kerb
-THERE_M = 0.01  # a body this close to where it waits is there
+THERE_M = 0.01  # a body this close to its waiting point has arrived
 TURN_MARGIN_M = 0.05  # room beyond the turn itself, for the corners of a half-turned box
 PAVEMENT_GAIN = 0.5  # how strongly a walker returns to its line on the pavement [rad/m]
 
@@ -26,7 +26,7 @@ def turn_limit(kind: Kind, v: float, dt: float) -> float:
 
 
 def room_to_turn(kind: Kind, turn: float) -> float:
-    """How far turning to a heading at full steering leads along that heading [m].
+    """Distance covered along a heading while turning to it at full steering [m].
 
     The body moves at beta off its orientation, so with phi the turn left to make the integral of
     rho cos(phi - beta) from phi to 0 is rho (sin(phi - beta) + sin beta).
@@ -128,7 +128,7 @@ class CrossingWalk:
 
 
 class Stroll:
-    """Walk along the pavement one starts on, at full speed, and stop at its end."""
+    """Walk along the pavement of the start, at full speed, and stop at its end."""
 
     def __init__(self, scene: Scene, index: int) -> None:
         self.dt, self.start = scene.dt, scene.starts[index]
@@ -180,7 +180,7 @@ class ApproachKerb:
         left = self.stop - self.way.progress(state.x, state.y)
         if left < THERE_M:
             return walk(state, state.o, 0.0, self.dt)  # or it would creep on for ever
-        # This timestep's way is walked at the old speed, whatever the throttle does.
+        # This timestep's way is walked at the old speed, for any throttle.
         allowed = stopping_speed(kind, left - state.v * self.dt, self.dt)
         if self.turning:
             return walk(state, self.way.heading, allowed, self.dt)

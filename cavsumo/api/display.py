@@ -26,10 +26,10 @@ FAILURES = ("run", "agent", "assertion", "tester", "violation_time_s", "avoidabl
 
 @dataclass(frozen=True)
 class ResultsSummary:
-    """What is said of results.
+    """The summary of results.
 
     Attributes:
-        scenario, tally: what was played, what was found.
+        scenario, tally: the scenario and the counts.
         failures: the rows of failures, preventable ones first.
         judged: whether a reference driver judged them.
         place: where they lie, and how the batch stands.
@@ -69,13 +69,13 @@ def episode_text(record: Record, trace: Trace) -> str:
 
 
 def episode_html(record: Record, trace: Trace) -> str:
-    """An episode as a table of what identifies it and what came out."""
+    """An episode as a table of its identity and its results."""
     said = f"<p><b>{escape(headline(record))}</b>. {escape(verdict(record.row))}</p>"
     return f"{said}\n{_table((), facts(record, trace))}"
 
 
 def _headline(summary: ResultsSummary) -> str:
-    """What was played and found, and where it lies."""
+    """The scenario, the results and their file."""
     scenario, found = summary.scenario, summary.tally.all
     said = f"{summary.tally.rows} episodes on {scenario.name}, ego {scenario.ego}: "
     said += sentences.failures(found, summary.judged)

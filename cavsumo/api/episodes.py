@@ -25,12 +25,12 @@ COLUMNS = ("time", "body", "x", "y", "v", "o")
 
 @dataclass(frozen=True, eq=False, repr=False)
 class RecordedEpisode:
-    """An episode with everybody's way through it.
+    """An episode with the tracks of all bodies.
 
     Attributes:
         record: its row and its plan.
-        trace: its frames as they were recorded.
-        site: where it took place.
+        trace: its recorded frames.
+        site: its place.
     """
 
     record: Record
@@ -49,7 +49,7 @@ class RecordedEpisode:
 
     @cached_property
     def frames(self) -> pandas.DataFrame:
-        """Everybody at every timestep.
+        """All bodies at every timestep.
 
         Columns: ``time`` [s]; ``body``, its id: ego, tester0, ... or that of SUMO's traffic; ``x``,
         ``y`` of its centre [m]; ``v``, its speed [m/s]; ``o``, its heading [rad], anticlockwise
@@ -92,7 +92,7 @@ def played_again(record: Record) -> RecordedEpisode:
 
 
 def as_recorded(record: Record) -> RecordedEpisode:
-    """An episode as it was recorded; raises InputError when no frame was kept."""
+    """A recorded episode; raises InputError when no frame was kept."""
     if record.trace is None:
         raise InputError(f"replay: no trace was kept of run {record.run}; it must be played")
     return RecordedEpisode(record, record.trace, shown_site(record.plan, record.trace))

@@ -3,14 +3,19 @@
 from __future__ import annotations
 
 import os
+import re
 from collections.abc import Mapping
-from typing import Any
+from typing import Any, get_args
+
+import numpy
 
 from cavsumo.errors import InputError
-from cavsumo.model.objects import SentObject, sent
+from cavsumo.model.objects import SentObject, objects_among, sent
 from cavsumo.model.scenario import Scenario
+from cavsumo.model.scenario.fields import settings as offered
 
-LISTS = ("agents", "assertions", "approaches", "additional")  # one word will do for a list of it
+# The settings that are lists: one value will do for a list of one, text may hold several.
+LISTS = {s.key: s.option.separator for s in offered() if get_args(s.type)[1:] == (...,)}
 
 
 def settings_of(net: Any, keywords: Mapping[str, Any]) -> tuple[dict[str, Any], list[SentObject]]:
@@ -43,17 +48,19 @@ def _plain(key: str, value: Any, objects: list[SentObject]) -> Any:
     if key == "agents" and isinstance(value, Mapping):
         return [f"{label}={_named(agent, objects)}" for label, agent in value.items()]
     if key == "agents":
-        return [_agent(one, objects) for one in _several(value)]
+        return [_agent(one, objects) for one in _several(key, value)]
     if key in ("ego", "assertions"):
-        names = [_named(one, objects) for one in _several(value)]
+        names = [_named(one, objects) for one in _several(key, value)]
         return names if key == "assertions" else names[0]
     if key in LISTS:
-        return [_text(one) for one in _several(value)]
+        return [_text(one) for one in _several(key, value)]
     return _text(value)
 
 
-def _several(value: Any) -> list[Any]:
-    """One as a list of one."""
+def _several(key: str, value: Any) -> list[Any]:
+    """The values of a list, of one value, or of text that holds several as on a command line."""
+    if isinstance(value, str) and (separator := LISTS.get(key)):
+        return [word for word in re.split(f"[{separator}]+", value) if word]
     return list(value) if isinstance(value, list | tuple) else [value]
 
 
@@ -66,11 +73,16 @@ def _agent(agent: Any, objects: list[SentObject]) -> str:
 def _named(thing: Any, objects: list[SentObject]) -> str:
     """The name of an agent, an ego or an assertion, as given or of the object."""
     if isinstance(thing, str):
+        objects += objects_among([thing])  # of a scenario that was played before
         return thing
     objects.append(sent(thing))
     return objects[-1].name
 
 
 def _text(value: Any) -> Any:
-    """A path as text, anything else as it is."""
-    return os.fspath(value) if isinstance(value, os.PathLike) else value
+    """A path as text, a number of numpy as one of Python, anything else as it is."""
+    if isinstance(value, os.PathLike):
+        return os.fspath(value)
+    if isinstance(value, Mapping):
+        return {key: _text(inner) for key, inner in value.items()}
+    return value.item() if isinstance(value, numpy.generic) else value

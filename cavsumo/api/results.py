@@ -12,17 +12,19 @@ from typing import TYPE_CHECKING, Any
 
 from cavsumo.api.display import ResultsSummary, results_html, results_text
 from cavsumo.api.episodes import RecordedEpisode, as_recorded, played_again
-from cavsumo.batch.replay import located, recorded_plan
+from cavsumo.batch.replay import located
 from cavsumo.batch.replay import recorded as find_recorded
 from cavsumo.batch.tally import Tally
 from cavsumo.errors import InputError
 from cavsumo.model.objects import SentObject
 from cavsumo.model.own_folders import OwnFolder
 from cavsumo.model.scenario import BatchPlan, Scenario
-from cavsumo.report.files import ReportOptions, write_report_files
+from cavsumo.report.files import write_report_files
+from cavsumo.report.order import ReportOptions
 from cavsumo.results.columns import COLUMNS
 from cavsumo.results.failures import preventable_first
 from cavsumo.results.reading import COMPLETE, read_results, whole_lines
+from cavsumo.results.recorded_plan import recorded_plan
 
 if TYPE_CHECKING:
     import pandas
@@ -31,9 +33,9 @@ REPORTS = {".md": "markdown", ".csv": "csv", ".json": "json", ".txt": "table"}
 
 
 class TemporaryFolder:
-    """A temporary folder for results that nobody gave a place.
+    """A temporary folder for results without an output file.
 
-    It goes with ``close``, with this object, or with the process.
+    It is removed by ``close``, with this object, or with the process.
     """
 
     def __init__(self) -> None:
@@ -69,8 +71,7 @@ class Results:
     def rows(self) -> pandas.DataFrame:
         """The episodes, a row each, by the numbers of their runs.
 
-        Numbers are numbers, and NaN stands where a value is missing. ``columns`` says what each
-        column means.
+        Numbers are numbers, NaN for missing values. ``columns`` explains the columns.
         """
         table = read_results(self.file)
         return table.set_axis(table["run"].rename(None), axis="index")
@@ -121,7 +122,7 @@ class Results:
 
         Args:
             run: its number.
-            recorded: take the frames that were kept, and play nothing.
+            recorded: use the recorded frames without playing the episode.
             net, routes: where the network and the routes are now, if not where they were.
 
         Raises:
@@ -140,7 +141,7 @@ class Results:
             file: ending in .html for a page (with replays in a folder beside it), .md, .csv,
                 .json or .txt for tables, .xml for JUnit.
             by: the column whose values are summary apart.
-            replays: of a page, how many failures have pages of their own.
+            replays: number of failures that have pages of their own, for a page.
 
         Raises InputError when the file cannot be written.
         """
@@ -176,7 +177,7 @@ class Results:
 
     @property
     def _place(self) -> str:
-        """Where the results lie, and how the batch stands if it is not complete."""
+        """The file of the results, and the status of an incomplete batch."""
         status = str(self.manifest.get("status"))
         words = ["" if self.folder else str(self.file), "" if status in COMPLETE else status]
         return ", ".join(filter(None, words))

@@ -10,9 +10,9 @@ from typing import Any
 
 from cavsumo.api.keywords import settings_of
 from cavsumo.api.results import Results, TemporaryFolder
-from cavsumo.batch.executors import Means
+from cavsumo.batch.manner import Manner, Means
 from cavsumo.batch.playing import played
-from cavsumo.batch.preflight import Manner, checked
+from cavsumo.batch.preflight import checked
 from cavsumo.batch.progress import is_shown
 from cavsumo.errors import InputError
 from cavsumo.model.named_networks import DEFAULT
@@ -20,7 +20,7 @@ from cavsumo.model.scenario import Scenario
 from cavsumo.model.scenario_file import read_config
 from cavsumo.model.study import Part, overruled
 
-FILE = "results.csv"  # of results that nobody gave a place
+FILE = "results.csv"  # of results without an output file
 
 
 def run(
@@ -48,19 +48,19 @@ def run(
         executor: a ``concurrent.futures.Executor`` or a dask ``Client`` that plays them instead.
         scheduler: the address of a dask scheduler whose workers play them.
         progress: show a bar, in a notebook or on a terminal.
-        resume: go on where the results end, or start.
+        resume: continue after the existing results, or start.
         retry_errors: play the episodes again that ended in errors.
-        overwrite: start again in place of an unfinished batch.
+        overwrite: start again in place of what lies there: an unfinished batch, or another one.
         **settings: of the scenario and of the batch, by their names in a scenario file
             (docs/python.md): ``agents``, ``ego``, ``testers``, ``runs``, ``seed`` ...
 
     Returns:
-        the results; an episode that could not be played is a row whose outcome is "error".
+        the results; an episode that could not be played is a row with the outcome "error".
 
     Raises:
-        InputError: an argument, a name or a file is wrong; nothing was played or written.
-        BatchError: the batch cannot go on, as for a full disk.
-        KeyboardInterrupt: somebody stopped it; what ran is in ``output``.
+        InputError: an argument, a name or a file is wrong; no episode was played.
+        BatchError: the batch cannot continue, for example on a full disk.
+        KeyboardInterrupt: the user stopped it; finished rows are in ``output``.
     """
     given, objects = settings_of(net, settings)
     if config is not None:

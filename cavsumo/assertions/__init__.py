@@ -1,8 +1,8 @@
-"""What the ego must not do: the protocol (``base``), the registry, one file an assertion.
+"""Assertions about the ego: the protocol (``base``), the registry, one file per assertion.
 
-Also what an episode is judged by besides: contacts, validity of the testers, blame, naturalness,
+Also the other evaluations of an episode: contacts, validity of the testers, blame, naturalness,
 criticality, ``metrics`` (functions of numbers), ``formulas`` (temporal logic).
-Nothing here moves a body.
+No file here moves a body.
 To add one: a file here, its name in ``names``; it is imported when one is built.
 """
 

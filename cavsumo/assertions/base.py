@@ -4,66 +4,34 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from typing import ClassVar
 
 from cavsumo.assertions.contacts import Contact
+from cavsumo.assertions.judgement import HELD as HELD  # the protocol has all of these
+from cavsumo.assertions.judgement import INVALID as INVALID
+from cavsumo.assertions.judgement import NOT_TRIGGERED as NOT_TRIGGERED
+from cavsumo.assertions.judgement import SEVERITY as SEVERITY
+from cavsumo.assertions.judgement import UNFAIR as UNFAIR
+from cavsumo.assertions.judgement import VIOLATED as VIOLATED
+from cavsumo.assertions.judgement import Judgement as Judgement
 from cavsumo.assertions.names import ASSERTION_NAMES
 from cavsumo.model.registry import Registry
 from cavsumo.model.scene import Scene
 from cavsumo.model.snapshot import Snapshot
 
-# Verdicts, the most serious first: how several assertions make one outcome.
-VIOLATED, UNFAIR, HELD, NOT_TRIGGERED = "violated", "unfair", "held", "not_triggered"
-INVALID = "invalid"  # of an episode in which a tester broke the rules of the world (``validity``)
-SEVERITY = (VIOLATED, UNFAIR, HELD, NOT_TRIGGERED)
-
-
-@dataclass(frozen=True, slots=True)
-class Judgement:
-    """What an assertion says of an episode.
-
-    Attributes:
-        assertion: its name.
-        verdict: ``not_triggered``: the precondition never held; ``held``: it did and the ego
-            coped; ``violated``: it did and the ego broke the assertion; ``unfair``: the tester
-            left the ego no chance.
-        tester: id of the body involved, if any.
-        trigger_time, violation_time: when the precondition began to hold, when the assertion was
-            broken [s].
-        ego_speed: speed of the ego at the violation, else at the trigger [m/s].
-        impact_speed: closing speed of a contact [m/s].
-        robustness: how far the ego kept from a violation, in the assertion's unit: its smallest
-            margin since the trigger, negative if and only if violated; None before the trigger.
-    """
-
-    assertion: str
-    verdict: str = NOT_TRIGGERED
-    tester: str = ""
-    trigger_time: float | None = None
-    violation_time: float | None = None
-    ego_speed: float | None = None
-    impact_speed: float | None = None
-    robustness: float | None = None
-
-    @property
-    def triggered(self) -> bool:
-        """Whether the episode was a test in the seed's sense."""
-        return self.verdict in (HELD, VIOLATED)
-
 
 class Assertion:
-    """Base of the assertions: watches an episode snapshot by snapshot.
+    """Base of the assertions, which evaluate an episode snapshot by snapshot.
 
     Attributes:
         name: as registered.
-        judgement: what it says so far.
-        decided: nothing that follows can change the judgement.
+        judgement: the judgement so far.
+        decided: no later snapshot can change the judgement.
         pending: the precondition held and the verdict is still open, so the episode goes on.
         sees_background: whether it looks at the background traffic or the traffic lights in the
             snapshots; contacts are reported in any case. See ``Agent.sees_background``.
         unconditional: it has no precondition, so that every episode is a test of it. Among several
-            assertions that it held makes no episode a test (``weightiest``).
+            assertions its verdict ``held`` does not make an episode a test (``weightiest``).
         unit: of the robustness.
     """
 
@@ -88,17 +56,17 @@ class Assertion:
         raise NotImplementedError
 
     def conclude(self) -> None:
-        """The episode is over: the judgement is final, of what needed all of it, too.
+        """End the episode: the judgement becomes final.
 
-        ``decided`` stays as it is unless the ego broke the assertion only now.
+        ``decided`` keeps its value unless the assertion is violated only now.
         """
 
 
 def weightiest(assertions: Sequence[Assertion]) -> Judgement:
     """The judgement that stands for an episode: the most serious, of equal ones the first.
 
-    Unless it is violated, an assertion without a precondition speaks only where there is no other:
-    that the ego kept to the speed limit does not make an episode a test of how it meets testers.
+    An assertion without a precondition counts only if it is violated or alone: an ego that keeps to
+    the speed limit does not make an episode a test of how it meets testers.
     """
     conditional = any(not a.unconditional for a in assertions)
     heard = [

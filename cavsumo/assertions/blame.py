@@ -1,9 +1,9 @@
 """Which party broke which rule first in a violated episode: a hint by rules, not law.
 
-Each rule says when it was broken first, no later than the violation; the earliest wins, at the same
-time the one that stands first in RULES. None of the rules broken means no blame: both may have
-done all that the rules ask, or the rule that was broken is not among them. docs/fairness.md lists
-the rules with their sources.
+For each rule the time is found at which it was first broken, up to the violation. The earliest
+counts, at equal times the first in RULES. If none was broken there is no blame: both parties may
+have obeyed all rules, or the broken rule is not among them. docs/fairness.md lists the rules with
+their sources.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ from cavsumo.model.zone_presence import is_vehicle
 RHO_S, ACCEL, B_MIN, B_MIN_CORRECT, B_MAX = 1.0, 3.5, 4.0, 3.0, 8.0  # s, m/s2
 # From where speed is enforced in the UK (National Police Chiefs' Council): 10 % and 2 mph over.
 SPEED_SHARE, SPEED_PLUS = 1.1, 2.0 * MPH
-AFTER_LINE_M = 60.0  # a stop line farther back than this has nothing to do with what happens
+AFTER_LINE_M = 60.0  # a stop line farther back than this is not related to the violation
 
 
 @dataclass(frozen=True)
@@ -39,8 +39,8 @@ class Case:
     Attributes:
         snapshots: one a timestep, the last is that of the violation.
         trigger: when the encounter began [s].
-        body: index of the tester's body involved, None for nobody or somebody of the background.
-        relations: how that body lay to the ego in each snapshot; empty without one.
+        body: index of the tester's body involved, None without one or for a background body.
+        relations: position of that body relative to the ego in each snapshot; empty without one.
     """
 
     scene: Scene
@@ -64,7 +64,7 @@ def blamed(scene: Scene, snapshots: Sequence[Snapshot], judgement: Judgement) ->
 
 
 def _case(scene: Scene, snapshots: Sequence[Snapshot], judgement: Judgement) -> Case:
-    """What is looked at."""
+    """The case of an episode."""
     end = judgement.violation_time
     assert end is not None  # it was violated
     seen = [s for s in snapshots if s.time <= end + 1e-9]
@@ -93,7 +93,7 @@ def ran_red_light(case: Case) -> float | None:
 def speeded(case: Case) -> float | None:
     """The ego was above the speed limit when the encounter began or later (rule 124).
 
-    The time is when it came above it, without a break since.
+    The time is the beginning of the last uninterrupted excess.
     """
     since: float | None = None
     for snapshot in case.snapshots:
@@ -115,7 +115,7 @@ def _limit(scene: Scene, snapshot: Snapshot) -> float | None:
 
 
 def answered_improperly(case: Case) -> float | None:
-    """The ego did not answer a body in its way as RSS asks (arXiv 1708.06374, definition 4).
+    """The ego did not respond properly to a body in its way (RSS, arXiv 1708.06374, definition 4).
 
     While the body is in its way and nearer than the safe distance, the ego accelerates by at most
     ACCEL for RHO_S, then brakes by at least B_MIN (B_MIN_CORRECT before one that comes towards it)
@@ -147,17 +147,17 @@ def _safe(snapshot: Snapshot, other: Relation) -> float:
 
 
 def walked_at_red(case: Case) -> float | None:
-    """Somebody on foot stepped out onto a crossing at lights that showed red to it (rule 21).
+    """A pedestrian stepped out onto a crossing at lights that showed red to it (rule 21).
 
-    The crossing is that on which the body came into the ego's way. Who began there, or stepped out
-    before the red, did nothing wrong.
+    The crossing is that on which the body came into the ego's way. A pedestrian that started there,
+    or stepped out before the red, did not break the rule.
     """
     step, red = _crossed_at_lights(case)
     return case.snapshots[step].time if step is not None and red else None
 
 
 def _crossed_at_lights(case: Case) -> tuple[int | None, bool]:
-    """When somebody on foot came onto a crossing at lights, and whether it showed red then.
+    """When a pedestrian came onto a crossing at lights, and whether it showed red then.
 
     The snapshot in which it came onto the crossing, or the carriageway beside it; None if it came
     into the ego's way anywhere else, or began there.
@@ -187,7 +187,7 @@ def _on_road(case: Case, crossing: MarkedCrossing, body: BodyState) -> bool:
 
 
 def stepped_out(case: Case) -> float | None:
-    """Somebody on foot stepped onto the carriageway within the ego's stopping distance.
+    """A pedestrian stepped onto the carriageway within the ego's stopping distance.
 
     The step is the last time before the violation at which the body came onto the carriageway or,
     on it, began to walk, while it was not yet in the ego's way. The stopping distance is that of
@@ -212,11 +212,12 @@ def stepped_out(case: Case) -> float | None:
 
 
 def stepped_in(case: Case) -> float | None:
-    """Somebody on foot came into the ego's way within its stopping distance, from wherever.
+    """A pedestrian came into the ego's way within its stopping distance, from any place.
 
-    As RSS has it of all who make the lateral distance unsafe last (definition 8): whoever already
-    walks on the carriageway still has to let pass who cannot stop. Not so on marked crossings with
-    lights or priority, where the ego may have had to wait.
+    By RSS the party that makes the lateral distance unsafe last is responsible (definition 8): a
+    pedestrian who already walks on the carriageway must still let a vehicle pass that cannot stop.
+    This does not hold on marked crossings with lights or priority, where the ego may have had to
+    wait.
     """
     if case.body is None or is_vehicle(case.tester[0]):
         return None
@@ -231,7 +232,7 @@ def stepped_in(case: Case) -> float | None:
 
 
 def _entered(case: Case) -> int | None:
-    """In which snapshot the body came into the ego's way, for the last time."""
+    """The snapshot in which the body last came into the ego's way."""
     steps = enumerate(pairwise(case.relations), 1)
     entered = [i for i, (before, after) in steps if after.in_way and not before.in_way]
     return entered[-1] if entered else None
@@ -247,8 +248,8 @@ def _too_near(case: Case, step: int) -> float | None:
 def cut_in(case: Case) -> float | None:
     """A vehicle came into the ego's way nearer than the safe distance, without right of way.
 
-    That is from a lane beside or, where it had to give way, from another road. RSS: who makes the
-    second of the two distances unsafe answers for it (definition 8).
+    That is from a lane beside or, where it had to give way, from another road. By RSS the party
+    that makes the second of the two distances unsafe is responsible (definition 8).
     """
     if case.body is None or not is_vehicle(case.tester[0]):
         return None

@@ -1,4 +1,4 @@
-"""The room that the ego left: robustness of assertions about contact."""
+"""The smallest gap to the ego: robustness of assertions about contact."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from cavsumo.assertions.contacts import Contact
 from cavsumo.model.geometry import gap
 from cavsumo.model.snapshot import BodyState
 
-LEAST = 1e-3  # m/s that a contact counts at least, so that the sign tells of it
+LEAST = 1e-3  # m/s, least closing speed of a contact, so that the sign shows it
 
 
 def impact(contact: Contact) -> float:
@@ -27,7 +27,7 @@ class Room:
         self.smallest = math.inf
 
     def note(self, ego: BodyState, other: BodyState) -> bool:
-        """Look at one more pair; whether it is the closest so far. Exact gaps are dear."""
+        """Take in one more pair; returns whether it is the closest so far."""
         reach = ego.body.kind.reach + other.body.kind.reach
         if math.hypot(other.x - ego.x, other.y - ego.y) - reach >= self.smallest:
             return False

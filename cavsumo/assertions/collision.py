@@ -1,4 +1,4 @@
-"""The bluntest assertion: the moving ego touches nobody, whosever fault it is."""
+"""The assertion that the moving ego touches no body, independently of fault."""
 
 from __future__ import annotations
 

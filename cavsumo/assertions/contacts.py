@@ -1,4 +1,4 @@
-"""Who touches whom: oriented boxes of the ego, the testers and the background traffic.
+"""Contacts between the oriented boxes of the ego, the testers and the background traffic.
 
 SUMO misses real overlaps and reports false ones (docs/collisions.md), so contact is decided here,
 on the true boxes. Background bodies among themselves are left to SUMO's own reports.
@@ -12,9 +12,9 @@ from typing import NamedTuple
 from cavsumo.model.geometry import Box, gap, overlap
 from cavsumo.model.snapshot import BodyState, RawState, Snapshot
 
-# Below this speed the ego stands: whoever touches it then walked into it [m/s].
+# Below this speed the ego stands: a body that touches it then has moved into it [m/s].
 STANDING_MPS = 0.1
-KEPT = 64  # candidates for the smallest gap before they are weeded
+KEPT = 64  # candidates for the smallest gap before the list is reduced
 
 
 Pair = tuple[BodyState, BodyState]
@@ -47,7 +47,7 @@ class ContactMonitor:
         self.pairs: list[Pair] = []
         self._touching: set[tuple[str, str]] = set()
         self._touched_standing: set[tuple[str, str]] = set()
-        # Where the smallest gap may have been: with its lower bound, those below any upper bound.
+        # Candidates for the smallest gap: with its lower bound, those below any upper bound.
         self._close: list[tuple[float, BodyState, BodyState]] = []
         self._upper = math.inf
         self._testers: tuple[BodyState, ...] = ()
@@ -106,7 +106,7 @@ class ContactMonitor:
     def _meetings_of_testers(self, snapshot: Snapshot) -> list[Pair]:
         """Testers touching the background or each other."""
         testers, background = snapshot.testers, snapshot.raw_background
-        if testers is not self._testers:  # or they all stand where they stood
+        if testers is not self._testers:  # or all stand still
             self._testers, self._among = testers, _meetings_among(testers)
         if not background:
             return self._among

@@ -1,8 +1,8 @@
 """Thresholds of criticality metrics: TTC, DRAC, PET (surrogate safety measures).
 
 The thresholds are the defaults of SUMO's SSM device, which measures vehicles only; here bodies are
-boxes on the plane, so that pedestrians count (``metrics.plane``, ``metrics.encroachment``). Looked
-at are the testers: background traffic on other lanes is on a course of collision at every bend.
+boxes on the plane, so that pedestrians count (``metrics.plane``, ``metrics.encroachment``). Only
+testers count, because background traffic on other lanes is on a collision course at every bend.
 """
 
 from __future__ import annotations
@@ -28,9 +28,9 @@ from cavsumo.model.snapshot import BodyState, Snapshot
 
 Metric = Callable[..., NDArray[np.float64]]
 Moment = tuple[float, Box]  # where a body was when
-COURSE_S = 10.0  # who would meet the ego later than this is on no course of collision
+COURSE_S = 10.0  # a body that would meet the ego later than this is on no collision course
 FIRM = 100.0  # m/s2; deceleration to avoid a contact that is there already
-CROSSING_RAD = math.radians(30.0)  # ways that meet at less do not cross
+CROSSING_RAD = math.radians(30.0)  # courses that meet at less do not cross
 
 
 def _velocity(state: BodyState) -> tuple[float, float]:
@@ -38,7 +38,7 @@ def _velocity(state: BodyState) -> tuple[float, float]:
 
 
 def _near(snapshot: Snapshot) -> list[BodyState]:
-    """The testers who could meet the moving ego within ``COURSE_S``."""
+    """The testers that could meet the moving ego within ``COURSE_S``."""
     ego = snapshot.ego
     if ego.v <= STANDING_MPS:
         return []
@@ -109,9 +109,9 @@ class PetAssertion(MarginAssertion):
 
     Precondition: one of them enters an area that both sweep and that the other left at most 10 s
     before, on ways that cross by at least 30 degrees. Violated by a post-encroachment time below
-    ``least_s``. Robustness: smallest PET less ``least_s`` [s]. Bodies: testers. Whoever comes
-    second is not asked: a tester who steps in behind the ego counts as well. How far the area
-    reaches shows as the second drives on, so that the time can become less after it has entered.
+    ``least_s``. Robustness: smallest PET less ``least_s`` [s]. Bodies: testers. Either body may be
+    first: a tester that steps in behind the ego also counts. The extent of the area is known only
+    as the second body moves on, so the time can decrease after it has entered.
     """
 
     name: ClassVar[str] = "pet"
@@ -138,7 +138,7 @@ class PetAssertion(MarginAssertion):
                 yield tester.id, min(times) - self.least_s
 
     def _note(self, now: float, state: BodyState) -> None:
-        """Add to a body's track; of the time that it stands only the first and the last count."""
+        """Add to a body's track; while it stands only the first and the last timestep are kept."""
         track = self._tracks.setdefault(state.id, deque())
         box = state.box
         if len(track) > 1 and track[-1][1] == track[-2][1] == box:
@@ -148,9 +148,10 @@ class PetAssertion(MarginAssertion):
             track.popleft()
 
     def _pet(self, second: str, first: str) -> float:
-        """How long after one body left the area in which another is now that one entered it [s].
+        """Time between one body's leaving an area and another's entering it, in which that one is
+        now [s].
 
-        Infinite if it is in none that the other has left.
+        Infinite if it is in no area that the other has left.
         """
         latest = list(self._tracks[second])[-2:]
         past = _passing(latest, self._tracks[first])
@@ -165,7 +166,7 @@ class PetAssertion(MarginAssertion):
 
 
 def _passing(latest: Sequence[Moment], track: Iterable[Moment]) -> list[Moment]:
-    """The part of a track, without gaps, outside of which nobody comes near the latest moments."""
+    """The contiguous part of a track with all its pieces near the latest moments."""
     (_, before), (_, box) = latest[0], latest[-1]
     own = 0.5 * (box.length + box.width) + math.dist(before[:2], box[:2])
     near = []

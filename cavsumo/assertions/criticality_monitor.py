@@ -1,10 +1,10 @@
-"""How critical an episode became: smallest TTC, largest DRAC, post-encroachment time.
+"""The criticality of an episode: smallest TTC, largest DRAC, post-encroachment time.
 
-Of the ego and the testers, pedestrians too, until the first contact between them. The snapshots are
-kept while the episode goes on and measured once, at its end. An exact time to collision costs ten
-times as much as one of the circles around two bodies, which it is never below: so these come
-first, and the boxes only of those that could still be the most critical. Of two tracks only parts
-near each other are compared. ``metrics`` has the same for arrays, without bounds.
+They are measured between the ego and each tester, pedestrians included, until their first contact.
+The snapshots are kept during the episode and evaluated once, at its end. An exact time to collision
+costs ten times as much as that of the circles around two bodies, which is a lower bound: so the
+circles come first, and the boxes only for pairs that could still be the most critical. Of two
+tracks only parts near each other are compared. ``metrics`` has the same for arrays, without bounds.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ class Extremes(NamedTuple):
 
 
 class CriticalityMonitor:
-    """What happened between the ego and the testers, until they first touch."""
+    """The encounters of the ego and the testers, until they first touch."""
 
     def __init__(self) -> None:
         self._kept: list[Snapshot] = []
@@ -81,7 +81,8 @@ def converging(kept: Sequence[Snapshot]) -> list[Pair]:
             dx, dy, reach = there_x - x, there_y - y, own + other.kind.reach
             passes, nearing = dx * wy - dy * wx, dx * wx + dy * wy
             room = reach * reach * square - passes * passes
-            # Centres that part already may have corners still to meet, while the circles overlap.
+            # While the circles overlap, corners may still meet although the centres already
+            # separate.
             if room >= 0.0 and square > 0.0 and nearing >= -sqrt(room):
                 least = (nearing - sqrt(room)) / square
                 if least <= HORIZON_S:
@@ -146,7 +147,7 @@ def _smallest_pet(kept: Sequence[Snapshot]) -> float:
         return math.inf
     last = zip(kept[0].testers, kept[-1].testers, strict=True)
     moved = [i for i, (one, other) in enumerate(last) if one is not other]
-    if not moved:  # they stood where they stood
+    if not moved:  # all stood still
         return math.inf
     times = [s.time for s in kept]
     reach = kept[0].ego.body.kind.reach + max(t.body.kind.reach for t in kept[0].testers)
@@ -155,10 +156,10 @@ def _smallest_pet(kept: Sequence[Snapshot]) -> float:
 
 
 def track(times: Sequence[float], states: Sequence[BodyState]) -> Track:
-    """Where a body was; of the time that it stands in one place only the first and the last."""
+    """The track of a body; while it stands only the first and the last timestep are kept."""
     found: Track = []
     x = y = math.nan
-    stood = None  # the last moment, if it is where the one before was
+    stood = None  # the last moment, if the body has not moved since the one before
     for moment in zip(times, states, strict=True):
         _, here, there, _, _ = moment[1]
         if here == x and there == y:
@@ -229,7 +230,7 @@ def pet(first: Stretched, *others: Track) -> float:
 
 
 def _compared(parts: Iterable[tuple[int, int]], mine: int, theirs: int) -> NDArray[np.bool_]:
-    """Which moments of two tracks to compare, of the parts that meet, shape (mine, theirs)."""
+    """The moments of two tracks to compare, of the parts that meet, shape (mine, theirs)."""
     found = np.zeros((mine, theirs), dtype=bool)
     for one, other in parts:
         i, j = STRETCH * one, STRETCH * other
@@ -249,7 +250,7 @@ def _rows(track: Track, parts: Sequence[int]) -> tuple[int, list[tuple[float, ..
 
 
 def _meetings(first: Sequence[Stretch], second: Sequence[Stretch]) -> list[tuple[int, int]]:
-    """Which rectangles overlap."""
+    """The pairs of rectangles that overlap."""
     found = []
     low_xs, high_xs, low_ys, high_ys = zip(*second, strict=True)
     low_x, high_x, low_y, high_y = min(low_xs), max(high_xs), min(low_ys), max(high_ys)

@@ -1,6 +1,6 @@
 """Assertions from the user: a Python function or class named ``module:attribute``.
 
-A function is given each snapshot, and the scene if its second parameter is called ``scene``; its
+A function receives each snapshot, and the scene if its second parameter is called ``scene``; its
 further parameters are those of the assertion. It returns a number, the robustness: below zero the
 assertion is violated. It returns None while its precondition does not hold.
 
@@ -8,8 +8,8 @@ A class is built with the parameters. It derives from ``Assertion``, or has ``ob
 which returns what a function returns, and may have ``reset(scene)``. An object that observes is
 copied afresh for every episode, so that what it keeps changes no later one.
 
-Either may say ``sees_background = False``: that it never looks at background traffic or lights; and
-``unconditional = True``: that it has no precondition.
+Either may set ``sees_background = False`` if it never uses background traffic or lights, and
+``unconditional = True`` if it has no precondition.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ SCENE = "scene"  # name of the second parameter of a function that is given the 
 
 
 class CustomAssertion(Assertion):
-    """What users wrote, kept from doing harm: whatever it does wrong is an AssertionFault."""
+    """An assertion of the user; each of its errors becomes an AssertionFault."""
 
     def __init__(self, spec: str, params: Mapping[str, Any]) -> None:
         self.name = spec  # type: ignore[misc]  # registered ones have theirs on the class
@@ -87,7 +87,7 @@ class CustomAssertion(Assertion):
             self.judgement = dataclasses.replace(self.judgement, robustness=self._margin)
 
     def _number(self, answer: Any, at: str) -> float:
-        """What was answered, if it is a number."""
+        """The answer as a float or None; raises AssertionFault for anything else."""
         if isinstance(answer, bool) or not isinstance(answer, Real) or math.isnan(answer):
             raise AssertionFault(
                 f"assertion {self.name} {at}: expected a number, below zero when violated, or "
@@ -113,7 +113,7 @@ class CustomAssertion(Assertion):
             self.decided = True
 
     def _take_over(self, at: str) -> None:
-        """Judge as the user's Assertion does, under the name that it was given by."""
+        """Take over the judgement of the user's Assertion, under the name by which it was given."""
         theirs = getattr(self._own, "judgement", None)
         if not isinstance(theirs, Judgement) or theirs.verdict not in SEVERITY:
             raise AssertionFault(
@@ -126,7 +126,7 @@ class CustomAssertion(Assertion):
 
 
 class _Function:
-    """A user's function as something that observes.
+    """A user's function as an object with ``observe``.
 
     Attributes:
         wants_scene: it is given the scene as well.
@@ -147,7 +147,7 @@ def custom_parameters(spec: str) -> inspect.Signature:
     entry = imported(spec, f"assertion {spec}", "function or class", functions=True)
     try:
         found = list(inspect.signature(entry).parameters.values())
-    except (TypeError, ValueError):  # of some that are not written in Python
+    except (TypeError, ValueError):  # of some classes that are not written in Python
         return inspect.Signature()
     if not isinstance(entry, type | Copies):
         found = found[2 if _takes_scene(entry) else 1 :]
@@ -170,7 +170,7 @@ def _takes_scene(function: Callable[..., Any]) -> bool:
 
 
 def _made(spec: str, params: Mapping[str, Any]) -> Any:
-    """The user's assertion, built; raises InputError if that is none."""
+    """The user's assertion, built; raises InputError if that fails."""
     entry = imported(spec, f"assertion {spec}", "function or class", functions=True)
     if not isinstance(entry, type | Copies):
         try:

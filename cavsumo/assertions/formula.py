@@ -1,8 +1,8 @@
-"""A temporal-logic formula as an assertion: it watches an episode and judges what it saw.
+"""A temporal-logic formula as an assertion: it keeps the signals of an episode and evaluates them.
 
-A rule ``always (p => q)`` is triggered when p first holds, any other formula by every episode. A
-rule that asks something of each timestep alone is judged at each, and decided by the first that
-breaks it. Any other is judged once a second and at the end: it is violated at the first timestep
+A rule ``always (p => q)`` is triggered when p first holds, any other formula in every episode. A
+rule that a single timestep can violate is evaluated at each timestep, and decided by the first
+violation. Any other is evaluated once a second and at the end: it is violated at the first timestep
 after which no continuation of the episode could satisfy it, which is found exactly.
 """
 
@@ -24,11 +24,11 @@ from cavsumo.errors import AssertionFault
 from cavsumo.model.scene import Scene
 from cavsumo.model.snapshot import Snapshot
 
-CHECK_S = 1.0  # how often a formula is judged that a single timestep cannot decide
+CHECK_S = 1.0  # interval of evaluations of a formula that a single timestep cannot decide
 
 
 class FormulaAssertion(Assertion):
-    """What the user wrote in the scenario file under ``formulas``."""
+    """A formula of the user, from the scenario file or the command line."""
 
     def __init__(self, rule: Rule) -> None:
         self.name = rule.name  # type: ignore[misc]  # registered ones have theirs on the class
@@ -72,7 +72,7 @@ class FormulaAssertion(Assertion):
     # A timestep alone
 
     def _judge_timestep(self, lasting: TruthNode) -> None:
-        """What the last timestep says of a rule that asks something of each."""
+        """Evaluate the last timestep for a rule that a single timestep can violate."""
         last, occasion = len(self._times) - 1, self.rule.occasion
         alone = partial(self._robustness, first=last)
         triggered = occasion is None or alone(occasion.precondition).least[0] > 0.0
@@ -85,12 +85,12 @@ class FormulaAssertion(Assertion):
     # The whole trace
 
     def _judge(self, closed: bool) -> None:
-        """What all timesteps so far say."""
+        """Verdict over the timesteps seen so far."""
         bounds = self._robustness(self.rule.whole, closed=closed)
         self._look_for_trigger(closed)
         if bounds.greatest[0] < 0.0:
             self._find_violation(float(bounds.greatest[0]))
-        elif bounds.least[0] > 0.0 and not closed:  # nothing that follows can break it
+        elif bounds.least[0] > 0.0 and not closed:  # no continuation can violate it
             self._hold(float(bounds.least[0]))
             self.decided, self.pending = True, False
         elif closed:
@@ -110,7 +110,7 @@ class FormulaAssertion(Assertion):
             self._trigger(occasion.first + int(when[0]))
 
     def _open(self) -> bool:
-        """Whether the rule is triggered and what it then asks within a time is still to come."""
+        """Whether the rule is triggered and the time limit of its consequence has not passed."""
         occasion = self.rule.occasion
         if occasion is None or not self.judgement.triggered:
             return False
@@ -121,7 +121,8 @@ class FormulaAssertion(Assertion):
         return bool(waiting[occasion.first : end].any())
 
     def _find_violation(self, margin: float) -> None:
-        """The first timestep after which nothing could satisfy the formula; the last if none.
+        """The first timestep after which no continuation could satisfy the formula; the last if
+        none.
 
         The greatest robustness never rises as a trace goes on, so the interval is halved.
         """
@@ -161,7 +162,7 @@ class FormulaAssertion(Assertion):
     def _robustness(
         self, node: TruthNode, first: int = 0, last: int | None = None, closed: bool = False
     ) -> Bounds:
-        """The robustness over the timesteps from the first up to but without the last."""
+        """The robustness over the timesteps from the first up to, but not including, the last."""
         trace = {name: np.array(values[first:last]) for name, values in self._values.items()}
         n = len(self._times[first:last])
         try:

@@ -20,9 +20,9 @@ from cavsumo.model.geometry import corners
 from cavsumo.model.scene import Scene
 from cavsumo.model.snapshot import BodyState, Snapshot
 
-AHEAD_M = 60.0  # a crossing is looked at from this far before it
-CLEAR_M = 0.5  # who is this far beside the ego's strip and walks away from it has crossed
-FACING = math.cos(math.pi / 3)  # who waits looks across, give or take 60 degrees
+AHEAD_M = 60.0  # distance from which a crossing counts
+CLEAR_M = 0.5  # a pedestrian this far beside the ego's strip that walks away has crossed
+FACING = math.cos(math.pi / 3)  # a waiting pedestrian faces the crossing within 60 degrees
 
 
 @ASSERTIONS.register("give-way")
@@ -73,7 +73,7 @@ class GiveWayAssertion(MarginAssertion):
     def _with_right(
         self, crossing: MarkedCrossing, snapshot: Snapshot, left: float
     ) -> Sequence[BodyState]:
-        """Those to whom the ego owes way: they came while it could still stop."""
+        """The pedestrians to which the ego must give way: they came while it could still stop."""
         v = snapshot.ego.v
         can_stop = left >= THINKING_S * v + v * v / (2.0 * DECEL)
         there = [b for b in everybody(snapshot) if self._claims(crossing, snapshot, b)]
@@ -83,7 +83,7 @@ class GiveWayAssertion(MarginAssertion):
         return [body for body in there if self._owed[crossing.id, body.id]]
 
     def _claims(self, crossing: MarkedCrossing, snapshot: Snapshot, body: BodyState) -> bool:
-        """Whether somebody is on a crossing and not past the ego's way, or waits at its kerb."""
+        """Whether a pedestrian is on a crossing before the ego's way, or waits at its kerb."""
         if body.body.kind.name not in WALKING:
             return False
         x0, y0, x1, y1 = crossing.surface.bounds
@@ -94,7 +94,7 @@ class GiveWayAssertion(MarginAssertion):
         return (on or self._waits(crossing, body)) and not self._has_crossed(body, snapshot)
 
     def _waits(self, crossing: MarkedCrossing, body: BodyState) -> bool:
-        """Whether somebody faces a crossing from within ``kerb_m``."""
+        """Whether a pedestrian faces a crossing from within ``kerb_m``."""
         if shapely.distance(crossing.surface, Point(body.x, body.y)) > self.kerb_m:
             return False
         x, y = crossing.surface.centroid.coords[0]
@@ -102,7 +102,7 @@ class GiveWayAssertion(MarginAssertion):
         return facing >= FACING
 
     def _has_crossed(self, body: BodyState, snapshot: Snapshot) -> bool:
-        """Whether somebody is beside the ego's strip and faces away from it."""
+        """Whether a pedestrian is beside the ego's strip and faces away from it."""
         here = self.scene.ego_path.project(body.x, body.y)
         o = self.scene.ego_path.at(here.along)[2]
         away = math.sin(body.o - o) * math.copysign(1.0, here.lateral) > 0.0

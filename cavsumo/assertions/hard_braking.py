@@ -12,18 +12,18 @@ from cavsumo.assertions.reasons import has_reason
 from cavsumo.model.checks import number, truth
 from cavsumo.model.snapshot import Snapshot
 
-ROOM_M = 5.0  # what is this far beyond the stopping distance is still a reason to brake
+ROOM_M = 5.0  # a body this far beyond the stopping distance is still a reason to brake
 
 
 @ASSERTIONS.register("hard-braking")
 class HardBrakingAssertion(MarginAssertion):
     """The ego does not brake hard without need (Highway Code, rules 117 and 118).
 
-    Precondition: none. Violated by a deceleration above ``most``, unless somebody in its way or
-    coming there, a vehicle that moves or a red or amber light is within its stopping distance
-    (rule 126) and 5 m (``reasons``), now or when it began; with ``at_all`` whatever the reason. The
-    default is a convention: telematics count events from 0.4 g. Robustness: ``most`` less the
-    hardest deceleration that counts [m/s2]. Bodies: testers and background.
+    Precondition: none. Violated by a deceleration above ``most``, unless a body in its way or
+    coming there, a vehicle that moves or a red or amber light is within its stopping distance (rule
+    126) and 5 m (``reasons``), now or when it began; with ``at_all`` for any reason. The default is
+    a convention: telematics count events from 0.4 g. Robustness: ``most`` less the hardest
+    deceleration that counts [m/s2]. Bodies: testers and background.
     """
 
     name: ClassVar[str] = "hard-braking"
@@ -47,7 +47,7 @@ class HardBrakingAssertion(MarginAssertion):
             yield "", margin
 
     def _needed(self, snapshot: Snapshot) -> bool:
-        """Whether there was something to brake for."""
+        """Whether there was a reason to brake."""
         v = snapshot.ego.v
         stopping = THINKING_S * v + v * v / (2.0 * DECEL)
         return has_reason(self.scene, snapshot, stopping + ROOM_M)

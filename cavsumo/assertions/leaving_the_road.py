@@ -11,7 +11,7 @@ from cavsumo.model.checks import number
 from cavsumo.model.geometry import corners
 from cavsumo.model.snapshot import Snapshot
 
-END_M = 5.0  # a road's end is no kerb: corners nearer to the ends of the path are not looked at
+END_M = 5.0  # the end of a road is no kerb: corners nearer to the ends of the path are ignored
 
 
 @ASSERTIONS.register("leaving-the-road")
@@ -21,7 +21,7 @@ class LeavingTheRoadAssertion(MarginAssertion):
     Precondition: none. Violated by a corner that is farther off the lanes for cars and the
     junctions between them than ``tolerance_m``; SUMO's vehicles cut corners by some decimetres.
     Robustness: distance of the corners from the edge, positive on the carriageway, plus the
-    tolerance [m]. Looks at the ego only.
+    tolerance [m]. Uses the ego only.
     """
 
     name: ClassVar[str] = "leaving-the-road"

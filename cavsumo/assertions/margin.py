@@ -1,4 +1,4 @@
-"""Assertions that are a margin: how much room the ego leaves while a precondition holds.
+"""Assertions defined by a margin that the ego keeps while a precondition holds.
 
 The precondition triggers when a margin is first given, the assertion is violated when one is below
 zero for longer than a grace period, and the robustness is the smallest. With a grace period g it is
@@ -27,13 +27,13 @@ Margin = tuple[str, float]  # the body involved (empty for none) and the margin 
 
 
 class MarginAssertion(Assertion):
-    """Base of assertions that give a margin for each body that the precondition holds for.
+    """Base of assertions that give a margin for each body for which the precondition holds.
 
-    Once violated, it watches until the precondition has ceased or the ego touches somebody, so that
-    the robustness tells how bad it became.
+    After a violation it continues until the precondition ends or the ego touches a body, so that
+    the robustness measures the whole violation.
 
     Attributes:
-        grace_s: how long a margin may stay below zero [s].
+        grace_s: time for which a margin may stay below zero [s].
     """
 
     grace_s: float = 0.0

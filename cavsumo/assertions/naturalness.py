@@ -1,4 +1,4 @@
-"""How naturally the testers move: what is possible but strange is measured, not forbidden."""
+"""Naturalness of the testers' motion: possible but unusual motion is measured, not forbidden."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ class Naturalness:
     """Adds up the testers' accelerations and turns during one episode.
 
     Attributes:
-        turning: how far they turned, to either side, together [rad].
+        turning: sum of their turns, to either side [rad].
     """
 
     def __init__(self) -> None:
@@ -23,7 +23,7 @@ class Naturalness:
     def observe(self, snapshot: Snapshot) -> None:
         """Take in a snapshot."""
         testers, before = snapshot.testers, self._testers
-        if testers is before:  # they all stand where they stood
+        if testers is before:  # all stand still
             return
         self._testers = testers
         for old, new in zip(before, testers, strict=False):

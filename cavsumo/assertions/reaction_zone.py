@@ -8,9 +8,9 @@ braking zone or the ego: late enough to be hard, early enough for a vehicle that
 A body that touches the braking zone or the ego first makes the episode unfair.
 
 Vehicles among the testers count by where they will be and only in the ego's way
-(``zone_presence``): one that is followed at an ordinary distance is in no zone until it brakes, one
-beside in its own lane never. A vehicle that drives into the ego's side or rear after the trigger
-makes the episode unfair: no ego could have done anything about it.
+(``zone_presence``): one that the ego follows at an ordinary distance is in no zone until it brakes,
+and one beside it in its own lane never is. A vehicle that drives into the ego's side or rear after
+the trigger makes the episode unfair: no ego could have avoided it.
 """
 
 from __future__ import annotations
@@ -46,7 +46,7 @@ class ReactionZoneAssertion(Assertion):
     """The ego hits no body it could have avoided (CAV-Gym's key assertion, the default).
 
     Decided by contact, by the ego having passed the body or standing clear of it, or by the body
-    having left the ego's way; whoever comes back after that meets the ego anew. Robustness:
+    having left the ego's way; a body that comes back after that meets the ego anew. Robustness:
     smallest gap to the body since the trigger [m]; of a violation minus the closing speed [m/s].
     """
 

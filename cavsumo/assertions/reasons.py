@@ -1,4 +1,4 @@
-"""What an ego may have to stop or to brake for, generously told."""
+"""Reasons of an ego to stop or to brake, in a generous sense."""
 
 from __future__ import annotations
 
@@ -11,13 +11,13 @@ from cavsumo.model.scene import Scene
 from cavsumo.model.snapshot import Snapshot
 from cavsumo.model.zone_presence import is_vehicle
 
-BESIDE_M = 1.0  # who stands this near the ego's strip may be about to enter it
+BESIDE_M = 1.0  # a body this near the ego's strip may be about to enter it
 
 
 def has_reason(scene: Scene, snapshot: Snapshot, within: float) -> bool:
-    """Whether somebody or a traffic light within a distance ahead is a reason to stop [m].
+    """Whether a body or a traffic light within a distance ahead is a reason to stop [m].
 
-    Somebody in the ego's way or at most a metre beside it, somebody who comes towards it, a vehicle
+    A body in the ego's way or at most a metre beside it, a body that comes towards it, a vehicle
     that moves near it (the ego may have to give way), a light that is not green.
     """
     front = front_along(scene, snapshot)
@@ -28,7 +28,7 @@ def has_reason(scene: Scene, snapshot: Snapshot, within: float) -> bool:
 
 
 def _concerns(other: Relation) -> bool:
-    """Whether somebody ahead is a reason to stop."""
+    """Whether a body ahead is a reason to stop."""
     if other.aside <= BESIDE_M:
         return True
     moves = math.hypot(other.onward, other.sideways) > STANDING_MPS

@@ -24,8 +24,8 @@ class RedLightAssertion(MarginAssertion):
     when the front bumper passes the stop line at red (before and after the timestep), or at an
     amber that came up while the line was farther than the overall stopping distance of rule 126:
     "you may go on only if the amber appears after you have crossed the stop line or are so close
-    to it that to pull up might cause a collision". Robustness: smallest distance to the line
-    while the light says stop, negative past it [m]. Looks at the lights.
+    to it that to pull up might cause a collision". Robustness: smallest distance to the line while
+    the light requires a stop, negative past it [m]. Uses the lights.
     """
 
     name: ClassVar[str] = "red-light"
@@ -41,7 +41,7 @@ class RedLightAssertion(MarginAssertion):
 
     def reset(self, scene: Scene) -> None:
         super().reset(scene)
-        self._stops = [False] * len(scene.lights)  # whether each light says stop to the ego
+        self._stops = [False] * len(scene.lights)  # whether each light requires the ego to stop
         self._passed = [False] * len(scene.lights)
 
     def margins(self, snapshot: Snapshot, before: Snapshot | None) -> Iterator[Margin]:
@@ -59,13 +59,13 @@ class RedLightAssertion(MarginAssertion):
                 yield "", left
 
     def _says_stop(self, i: int, shown: str, left: float, snapshot: Snapshot) -> bool:
-        """Whether a light says stop to an ego that far before its line."""
+        """Whether a light requires an ego at that distance before its line to stop."""
         if shown in RED:
             return True
         if shown not in AMBER or not self.amber:
             return False
         v = snapshot.ego.v
-        # What an amber said when it came up it says until it changes.
+        # The requirement of an amber light when it appeared holds until it changes.
         return self._stops[i] or self._came_up(i, shown, left, v)
 
     def _came_up(self, i: int, shown: str, left: float, v: float) -> bool:

@@ -1,7 +1,7 @@
-"""How others lie to the ego along its path: ahead, aside, onward, sideways.
+"""Positions and speeds of other bodies relative to the ego's path: ahead, aside, onward, sideways.
 
-The ego's way is the strip of its width along its path, so a curve does not put whoever stands
-beside it in front of the ego. Cheap tests come first: most bodies are far.
+The ego's way is the strip of its width along its path, so a body beside a curve is not in front of
+the ego. Cheap tests come first, because most bodies are far.
 """
 
 from __future__ import annotations
@@ -44,13 +44,14 @@ def front_along(scene: Scene, snapshot: Snapshot) -> float:
 
 
 def relations(scene: Scene, snapshot: Snapshot, within: float) -> Iterator[Relation]:
-    """Everybody within a distance of the ego who is not behind it [m]."""
+    """All bodies within a distance of the ego that are not behind it [m]."""
     ego = snapshot.ego
     far = within + ego.body.kind.reach
     rear = front_along(scene, snapshot) - ego.body.kind.length
     for body in everybody(snapshot):
         reach = far + body.body.kind.reach
-        # An ego that turns has what is before it beside it, so nobody is left out by direction.
+        # For a turning ego a body ahead on its path may be beside it, so no body is left out by
+        # direction.
         if abs(body.x - ego.x) > reach or abs(body.y - ego.y) > reach:
             continue
         found = relation(scene, snapshot, body)
@@ -59,7 +60,7 @@ def relations(scene: Scene, snapshot: Snapshot, within: float) -> Iterator[Relat
 
 
 def relation(scene: Scene, snapshot: Snapshot, body: BodyState) -> Relation:
-    """How one body lies to the ego."""
+    """The relation of one body to the ego."""
     path, half = scene.ego_path, snapshot.ego.body.kind.width / 2
     middle, left = _placed(path, body.x, body.y)
     ends = [_placed(path, x, y) for x, y in corners(body.box)]
@@ -87,7 +88,7 @@ def _placed(path: Path, x: float, y: float) -> tuple[float, float]:
 
 
 def in_way(scene: Scene, snapshot: Snapshot, within: float) -> Iterator[Relation]:
-    """Those in the ego's way ahead of it, no farther than that [m]."""
+    """The bodies in the ego's way ahead of it within a distance [m]."""
     for found in relations(scene, snapshot, within):
         if found.in_way and -snapshot.ego.body.kind.length < found.ahead <= within:
             yield found

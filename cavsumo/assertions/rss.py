@@ -19,8 +19,8 @@ from cavsumo.model.checks import number
 from cavsumo.model.scene import Scene
 from cavsumo.model.snapshot import Snapshot
 
-RANGE_M = 150.0  # nobody farther away is looked at
-SLACK = 0.05  # m/s2 that rounding may cost
+RANGE_M = 150.0  # bodies farther away are ignored
+SLACK = 0.05  # m/s2, tolerance for rounding
 
 
 @dataclass(frozen=True)
@@ -29,7 +29,7 @@ class Danger:
 
     Attributes:
         since: when it began, the blame time [s].
-        response: in which direction the distance became unsafe last, where the response is due.
+        response: the direction in which the distance became unsafe last and the response is due.
     """
 
     since: float
@@ -40,15 +40,16 @@ class Danger:
 class RssAssertion(MarginAssertion):
     """In a situation that RSS calls dangerous the ego responds properly (arXiv 1708.06374).
 
-    Precondition: the longitudinal and the lateral distance to somebody not behind the moving ego
+    Precondition: the longitudinal and the lateral distance to a body not behind the moving ego
     become unsafe. The response is due in the direction that became unsafe last. Longitudinal: for
     ``rho`` the ego accelerates by at most ``a_max_accel``, then brakes by at least ``b_min``
     (``b_min_correct`` before oncoming traffic) until the distance is safe or it stands. Lateral
-    (somebody cuts or steps in): for ``rho`` it gains speed sideways towards them by at most
-    ``a_lat_max_accel``, then brakes sideways by at least ``b_lat_min``; who keeps to its lane has
-    nothing to do.
-    Violated by less. Robustness: smallest difference of the accelerations [m/s2]. Bodies: testers
-    and background. Defaults: those of CARLA's RSS sensor (RssCheck.cpp), for all bodies.
+    (a body cuts or steps in): for ``rho`` it gains speed sideways towards it by at most
+    ``a_lat_max_accel``, then brakes sideways by at least ``b_lat_min``; an ego that keeps to its
+    lane satisfies this. Violated by less. Robustness: smallest difference of the accelerations
+    [m/s2].
+    Bodies: testers and background. Defaults: those of CARLA's RSS sensor (RssCheck.cpp), for all
+    bodies.
     """
 
     name: ClassVar[str] = "rss"
@@ -109,7 +110,7 @@ class RssAssertion(MarginAssertion):
         self._unsafe, self._dangers = unsafe, dangers
 
     def _judge(self, snapshot: Snapshot, other: Relation) -> tuple[bool, bool]:
-        """Whether somebody is nearer than is safe, longitudinally and laterally."""
+        """Whether a body is nearer than is safe, longitudinally and laterally."""
         v, accel = snapshot.ego.v, self.a_max_accel
         if other.onward < -STANDING_MPS:
             safe = rss_longitudinal_opposite(
@@ -130,19 +131,19 @@ class RssAssertion(MarginAssertion):
         return float(safe)
 
     def _begun(self, name: str, now: float) -> Danger:
-        """A situation that has just become dangerous: what became unsafe last decides."""
+        """A situation that has just become dangerous, by the distance unsafe last."""
         longitudinal, lateral = self._unsafe.get(name, (False, False))
         return Danger(now, "lateral" if longitudinal and not lateral else "longitudinal")
 
     def _margin(
         self, snapshot: Snapshot, other: Relation, danger: Danger, accel: float, v_before: float
     ) -> float:
-        """By how much the ego's response is better than the least that is proper [m/s2]."""
+        """Margin of the ego's response to the least proper one [m/s2]."""
         elapsed = snapshot.time - danger.since
         responding = elapsed > self.rho + self.scene.dt - 1e-9
         if danger.response == "longitudinal":
             if elapsed <= 0.0:
-                return self.a_max_accel  # how it drove before that is nobody's business
+                return self.a_max_accel  # its acceleration before that does not count
             least = self.b_min_correct if other.onward < -STANDING_MPS else self.b_min
             return SLACK + ((-accel - least) if responding else (self.a_max_accel - accel))
         towards = self._towards(other, self._lateral[1])
@@ -152,11 +153,11 @@ class RssAssertion(MarginAssertion):
         return SLACK + (-gained - self.b_lat_min if responding else self.a_lat_max_accel - gained)
 
     def _towards(self, other: Relation, leftwards: float) -> float:
-        """A lateral speed of the ego as one towards somebody."""
+        """A lateral speed of the ego as one towards a body."""
         return leftwards if other.left else -leftwards
 
     def _sideways(self, snapshot: Snapshot, before: Snapshot | None) -> tuple[float, float]:
-        """The ego's offset from its path to the left, and how fast that grows."""
+        """The ego's offset from its path to the left, and its rate of change."""
         offset = self.scene.ego_projection(snapshot).lateral
         speed = 0.0 if before is None else (offset - self._lateral[0]) / self.scene.dt
         return offset, speed

@@ -1,4 +1,4 @@
-"""From the words that name assertions to the assertions, and to the files that they are made of."""
+"""Assertions by name: building them, and the files that define them."""
 
 from __future__ import annotations
 
@@ -15,14 +15,22 @@ from cavsumo.assertions.names import is_formula
 from cavsumo.errors import InputError
 from cavsumo.model.plugins import imported, source_file
 from cavsumo.model.registry import Registry
+from cavsumo.model.scenario import Scenario
 
-# What an assertion may be called besides a registered name, for listings.
+# Forms of an assertion's name besides a registered name, for listings.
 FORMS: Mapping[str, str] = {
     "module:function": "a Python function of each snapshot, below zero where it is violated; or a "
     "class (README)",
     "NAME=FORMULA": "temporal logic over named signals: --formula or [formulas] in the scenario "
     "file (docs/formulas.md)",
 }
+
+
+def assertions_of(scenario: Scenario) -> tuple[Assertion, ...]:
+    """The assertions of a scenario; see ``make_assertions``."""
+    return make_assertions(
+        scenario.assertions, scenario.assertion_params, scenario.formulas, scenario.step_length
+    )
 
 
 def make_assertions(
@@ -46,7 +54,7 @@ def make_assertions(
 
 
 def registry_of(names: Iterable[str], rules: Mapping[str, Rule]) -> Registry[Assertion]:
-    """All registered assertions, these formulas, and those of the names that are the user's."""
+    """All registered assertions, these formulas, and the user's own among the names."""
     known: Registry[Assertion] = Registry("assertion")
     for name in ASSERTIONS:
         known.register(name)(ASSERTIONS.get(name))
@@ -65,7 +73,7 @@ def registry_of(names: Iterable[str], rules: Mapping[str, Rule]) -> Registry[Ass
 
 
 def assertion_files(names: Iterable[str]) -> tuple[Path, ...]:
-    """The files of the modules that the user's assertions come from."""
+    """The files of the modules of the user's assertions."""
     custom = [name for name in names if ":" in name]
     for name in custom:
         custom_parameters(name)  # imports it

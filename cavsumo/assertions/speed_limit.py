@@ -19,8 +19,8 @@ class SpeedLimitAssertion(MarginAssertion):
 
     Precondition: none. Violated by a speed above the network's limit where the ego's centre is,
     plus the tolerance; the default is the threshold of police enforcement in the UK (National
-    Police Chiefs' Council: 10 % and 2 mph). Robustness: limit and tolerance less speed [m/s]. Looks
-    at the ego only.
+    Police Chiefs' Council: 10 % and 2 mph). Robustness: limit and tolerance less speed [m/s]. Uses
+    the ego only.
     """
 
     name: ClassVar[str] = "speed-limit"

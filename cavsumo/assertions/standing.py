@@ -1,6 +1,6 @@
 """The ego does not stand without reason (Highway Code, rules 154 and 240).
 
-An ego that parks for ever passes every other assertion; this one tells it from a safe one.
+An ego that never moves passes every other assertion; this one distinguishes it from a safe ego.
 """
 
 from __future__ import annotations
@@ -19,9 +19,9 @@ from cavsumo.model.snapshot import Snapshot
 
 @ASSERTIONS.register("standing")
 class StandingAssertion(MarginAssertion):
-    """The ego does not stand for long without reason; one that parks for ever is not safe.
+    """The ego does not stand for long without reason; one that never moves is not safe.
 
-    Precondition: it stands. Violated when it stands for longer than ``most_s`` with nobody in its
+    Precondition: it stands. Violated when it stands for longer than ``most_s`` with no body in its
     way or coming there, no vehicle moving and no red or amber light within ``near_m``
     (``reasons``). The rule it comes from: do not stop where you hinder others (Highway Code, rule
     240). Robustness: ``most_s`` less the longest such time [s]. Bodies: testers and background.

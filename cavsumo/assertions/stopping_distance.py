@@ -1,4 +1,4 @@
-"""The ego keeps its overall stopping distance to whoever is in its way (Highway Code, rule 126)."""
+"""The ego keeps its overall stopping distance to bodies in its way (Highway Code, rule 126)."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from cavsumo.assertions.relations import in_way
 from cavsumo.model.checks import number, truth
 from cavsumo.model.snapshot import Snapshot
 
-NEARBY = 2.0  # stopping distances within which somebody counts as ahead
+NEARBY = 2.0  # stopping distances within which a body counts as ahead
 
 
 @ASSERTIONS.register("stopping-distance")
@@ -23,9 +23,9 @@ class StoppingDistanceAssertion(MarginAssertion):
     "Never get closer than the overall stopping distance": thinking and braking distance by the
     model of the rule's table (``metrics.highway_code``), doubled on wet roads (rule 227).
 
-    Precondition: somebody is in the moving ego's way, within twice that distance. Violated by a gap
-    that is shorter for longer than ``grace_s`` while the ego does not brake by ``braking``: who
-    steps or cuts in leaves it that time to react, and while it reacts it does nothing wrong.
+    Precondition: a body is in the moving ego's way, within twice that distance. Violated by a gap
+        that is shorter for longer than ``grace_s`` while the ego does not brake by ``braking``: it
+        has that time to react to a body that steps or cuts in, and braking is a reaction.
     Robustness: the gap less the stopping distance [m], 0 at least while it brakes. Bodies: testers
     and background.
     """

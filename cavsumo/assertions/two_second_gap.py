@@ -22,7 +22,7 @@ class TwoSecondGapAssertion(MarginAssertion):
 
     Precondition: a vehicle that drives the same way is in the way of an ego faster than
     ``from_mps``, within twice the gap. Violated by a time gap (distance over the ego's speed) that
-    is shorter for longer than ``grace_s``, so that an ego that somebody cuts in on can fall back.
+    is shorter for longer than ``grace_s``, so that an ego can fall back after a vehicle cuts in.
     Robustness: the time gap less the one to keep [s]. Bodies: testers and background.
     """
 

@@ -1,18 +1,18 @@
-"""Whether the testers keep to the rules of the world: a test that breaks them proves nothing.
+"""Validity of tests: whether the testers obey the rules of the simulated world.
 
 An episode is invalid if the body that the verdict names broke a rule before it, or any body at the
-start. Where nothing was tested nothing can be invalid: such an episode stays in the rates, or
-agents would be rewarded for wasting it. What a body must not do before the verdict:
+start. An episode without a test cannot be invalid: it stays in the rates, or agents would be
+rewarded for wasting it. A body must not, before the verdict:
 
 * start in another body;
 * get into another body deeper than people and vehicles can. The depth of a pair is measured once,
-  in full, and grows while a tester of the pair moves. Of two testers both answer for it, or bodies
-  would pass through each other in a valid test; a tester that stands gets into nobody else, so
-  background traffic that does not see it costs it nothing;
+  in full, and grows while a tester of the pair moves. Of two testers both are responsible, or
+  bodies would pass through each other in a valid test; a standing tester is not responsible for
+  other bodies, so background traffic that does not see it has no consequence;
 * get into the standing ego and still be there when that drives on;
 * leave the world: on foot farther than STRAY_M from carriageways and pavements, vehicles farther
   than OFF_ROAD_M from the carriageway, unless at the end of its way out of the network;
-* move as its kind cannot. Actions cannot do that; whoever writes states could.
+* move as its kind cannot. Actions cannot do that, but states set directly could.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ from cavsumo.network.pedestrian_starts import NEAR_M
 # their box, 0.66 m by 0.88 m, is larger than a person, who brushes past others.
 DEEP_M = {2: 0.3, 1: 0.15, 0: 0.1}
 STARTS_IN = "starts in"
-STRAY_M = NEAR_M  # who starts on a pavement so far from the road may cross the verge between them
+STRAY_M = NEAR_M  # a tester on a pavement so far from the road may cross the verge between them
 OFF_ROAD_M = 1.0
 ROUNDING = 1e-6  # m, m/s, rad
 
@@ -62,9 +62,10 @@ class ValidityMonitor:
         self._scene = scene
         self._index = {body.id: i for i, body in enumerate(scene.bodies)}
         self._testers: tuple[BodyState, ...] = ()
-        # Of each pair that touches: what counts of its depth, and all of it [m].
+        # For each pair that touches: the counted part of its depth, and its depth [m].
         self._depths: dict[tuple[str, str], tuple[float, float]] = {}
-        # Where each was last looked for on the map, and how far from there it cannot have left.
+        # The last place checked for each body, and the distance from there within which it is
+        # valid.
         self._known = [(math.inf, math.inf, 0.0)] * len(scene.bodies)
 
     def observe(self, snapshot: Snapshot, pairs: Sequence[Pair]) -> None:
@@ -93,7 +94,7 @@ class ValidityMonitor:
             return first
         if judgement.verdict == NOT_TRIGGERED:
             return None
-        # A verdict that names nobody, or somebody of the background, rests on all of them.
+        # If a verdict names no tester, the breach of any tester counts.
         return self.breaches.get(judgement.tester) if judgement.tester in self._index else first
 
     def _look_at_starts(self, snapshot: Snapshot, pairs: Sequence[Pair]) -> None:
@@ -106,7 +107,7 @@ class ValidityMonitor:
                 self._report(snapshot, tester.id, f"{STARTS_IN} {other.id}")
 
     def _look_at_pairs(self, snapshot: Snapshot, pairs: Sequence[Pair]) -> None:
-        """Measure how deep pairs are in each other, once each, and report who is too deep."""
+        """Measure the depth of each pair once, and report pairs that are too deep."""
         before, self._depths = self._depths, {}
         standing = snapshot.ego.v <= STANDING_MPS
         for a, b in pairs:
@@ -121,7 +122,7 @@ class ValidityMonitor:
                 self._report_pair(snapshot, a, b)
 
     def _moved(self, state: BodyState) -> bool:
-        """Whether it is a tester that is not where it was."""
+        """Whether a body is a tester that has moved."""
         i = self._index.get(state.id)
         return i is not None and state[1:] != self._testers[i][1:]
 
@@ -145,7 +146,7 @@ class ValidityMonitor:
                 self._report(snapshot, body.id, "left the world")
 
     def _in_world(self, i: int, body: BodyState) -> bool:
-        """Look a body up on the map."""
+        """Whether a body is inside the world."""
         roads, on_foot = self._scene.roads, body.body.kind.name in WALKING
         if roads is None:
             self._known[i] = body.x, body.y, math.inf

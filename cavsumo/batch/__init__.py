@@ -1,7 +1,7 @@
-"""Many episodes: checked beforehand, played in processes, collected in order, played again.
+"""Many episodes: prepared, played in processes, collected in order, replayed.
 
 ``preflight`` checks, ``dispatch`` hands ``jobs`` to executors, ``worker`` watches the process in
-which ``episode_runner`` plays them, ``batch_run`` writes what comes back. ``certify`` bounds how
-surely a test triggers. Tables and pages are made in ``report``.
-To add a way to spread episodes over machines: ``executors``; a reason to stop: ``stopping``.
+which ``episode_runner`` plays them, ``batch_run`` writes the results. ``certify`` bounds the
+probability that a test triggers. ``report`` makes tables and pages. To add a way to distribute
+episodes over machines: ``executors``; a reason to stop: ``stopping``.
 """

@@ -1,4 +1,4 @@
-"""A batch being played into its results file: from the start, from where it stopped, or again."""
+"""Playing a batch into its results file: from the start, continued, or errors again."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from cavsumo.batch.dispatch import run_batch
-from cavsumo.batch.learning import Lessons
+from cavsumo.batch.learning import Knowledge
 from cavsumo.batch.messages import Answer
 from cavsumo.batch.prepared import OUTPUTS, PreparedBatch
 from cavsumo.batch.progress import Progress
@@ -27,16 +27,16 @@ LOOK_AHEAD = 4  # episodes under way or waiting for their turn, for each that is
 
 @dataclass
 class BatchRun:
-    """A batch under way; call ``begin`` or ``resume``, then what is to be done, then ``end``.
+    """A running batch; call ``begin`` or ``resume``, then ``play`` or ``retry``, then ``end``.
 
     Attributes:
-        prepared, recorder: what is played, and who writes it.
-        executor, jobs: who plays it, and how many episodes at a time.
-        stopped: says whether somebody asked to stop.
+        prepared, recorder: the batch, and the writer of its results.
+        executor, jobs: the executor, and the number of episodes at a time.
+        stopped: returns whether the user asked to stop.
         quiet: no progress.
-        tally: what was found, earlier sessions included.
-        status: how the batch stands: finished, stopped (by a rule), interrupted or broken.
-        cut_short: whether somebody stopped it before all errors were played again.
+        tally: the counts, earlier sessions included.
+        status: finished, stopped (by a rule), interrupted or broken.
+        cut_short: whether the user stopped it before all errors were played again.
     """
 
     prepared: PreparedBatch
@@ -55,22 +55,22 @@ class BatchRun:
     def begin(self, manifest: Mapping[str, Any], *, overwrite: bool = False) -> None:
         """Start the results file."""
         self._todo = self.prepared.plan.todo()
-        self._lessons = Lessons(self.prepared, {})
+        self._knowledge = Knowledge(self.prepared, {})
         self.recorder.begin(manifest, overwrite=overwrite)
 
     def resume(self, manifest: Mapping[str, Any]) -> None:
-        """Take up the rows that are there."""
+        """Take up the recorded rows."""
         self._todo = self.prepared.plan.todo()
-        self._lessons = Lessons(self.prepared, manifest)
+        self._knowledge = Knowledge(self.prepared, manifest)
         for row in self.recorder.resume(manifest, self._todo):
             self.tally.add(row)
-            self._lessons.seen(row)
-        self._lessons.catch_up(self.executor)
+            self._knowledge.seen(row)
+        self._knowledge.catch_up(self.executor)
         recorded = manifest["status"]
         self.status = recorded if recorded in COMPLETE else "interrupted"
 
     def play(self) -> None:
-        """Play what is left, until the end or a reason to stop."""
+        """Play the remaining episodes, until the end or a reason to stop."""
         self.status = "broken"
         rule = stopping_rule(self.prepared.plan)
         reason = rule(self.tally)
@@ -78,9 +78,9 @@ class BatchRun:
             for answer in self._answers(self._todo) if reason is None else ():
                 row = self.recorder.write(answer.outcome)
                 self.tally.add(row)
-                learned = self._lessons.learned(row, answer.memory) and self._lessons.due
+                learned = self._knowledge.learned(row, answer.memory) and self._knowledge.due
                 if self._note_outputs() or learned:
-                    self.recorder.checkpoint(self._lessons.facts())
+                    self.recorder.checkpoint(self._knowledge.facts())
                 progress.update(self.tally)
                 reason = rule(self.tally)
                 if reason is not None:
@@ -90,23 +90,26 @@ class BatchRun:
         self.recorder.manifest["stopped_by"] = reason
 
     def retry(self) -> None:
-        """Play the episodes again that could not be played.
+        """Play the episodes again that ended in errors.
 
-        An agent that learns missed a lesson then: it starts anew, and its later rows change too.
+        A learning agent did not learn from such an episode: it starts anew, and its later rows
+        change.
         """
-        todo, pupils = _to_retry(self.recorder.csv_file, self.prepared.plan, self._lessons.names)
-        known = self._lessons.known()
-        self._lessons.forget(pupils)
+        todo, relearning = _to_retry(
+            self.recorder.csv_file, self.prepared.plan, self._knowledge.names
+        )
+        known = self._knowledge.known()
+        self._knowledge.forget(relearning)
         replaced: dict[int, Outcome] = {}
         with Progress(len(todo), self.quiet) as progress:
             for answer in self._answers(todo):
                 row = answer.outcome.row
-                self._lessons.learned(row, answer.memory)
+                self._knowledge.learned(row, answer.memory)
                 replaced[row["run"]] = answer.outcome
                 progress.update(self.tally)
         self.cut_short = len(replaced) < len(todo)
-        if self.cut_short and pupils:
-            self._lessons.restore(known)
+        if self.cut_short and relearning:
+            self._knowledge.restore(known)
             raise BatchError("interrupted before the learning agents were done: nothing changed")
         self.recorder.replace(replaced)
         self.tally = Tally()
@@ -119,7 +122,7 @@ class BatchRun:
         self.recorder.finish(self.status, self.tally.facts() | self._lessons.facts())
 
     def _note_outputs(self) -> bool:
-        """Note in the manifest which files the ego has written; whether there are new ones."""
+        """Record the files that the ego has written in the manifest; returns whether any is new."""
         noted = self.recorder.manifest
         before = set(noted.get(OUTPUTS) or ())
         found = before.union(self._watch.outputs())
@@ -130,12 +133,12 @@ class BatchRun:
         return True
 
     def _answers(self, todo: Iterable[int]) -> Iterator[Answer]:
-        """Have episodes played."""
+        """Play episodes by the executor."""
         return run_batch(
             self.prepared,
             self.executor,
             todo,
-            memories=self._lessons.memories,
+            memories=self._knowledge.memories,
             ahead=LOOK_AHEAD * self.jobs,
             stopped=self.stopped,
         )
@@ -144,19 +147,19 @@ class BatchRun:
 def _to_retry(
     csv_file: Path, plan: BatchPlan, learners: frozenset[str]
 ) -> tuple[list[int], frozenset[str]]:
-    """The episodes to play again, and which learners start anew because they have any.
+    """The episodes to play again, and the learners that start anew because they have any.
 
     Those are all episodes of such a learner, and all that shared a simulation with an error.
     """
     runs: dict[str, list[int]] = {name: [] for name in learners}
-    errors, pupils, last = set(), set(), -1
+    errors, relearning, last = set(), set(), -1
     for row in rows_of(csv_file):
         last = int(row["run"])
         if row["agent"] in learners:
             runs[row["agent"]].append(last)
         if row["outcome"] == "error":
             errors.add(last // plan.block)
-            pupils |= {row["agent"]} & learners
+            relearning |= {row["agent"]} & learners
     again = {run for group in errors for run in range(group * plan.block, (group + 1) * plan.block)}
-    again |= {run for name in pupils for run in runs[name]}
-    return sorted(run for run in again if run <= last), frozenset(pupils)
+    again |= {run for name in relearning for run in runs[name]}
+    return sorted(run for run in again if run <= last), frozenset(relearning)

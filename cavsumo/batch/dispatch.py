@@ -1,9 +1,9 @@
-"""Many episodes over any executor, their outcomes in the order of their numbers.
+"""Many episodes by any executor, with their outcomes in the order of their numbers.
 
-Whatever finishes first and wherever it was played, what comes out is the same. Episodes are
-independent of each other, but for agents that learn: those take their memory along from one of
-their episodes to the next, so they learn in sequence while the episodes of others fill the
-executor. What was learned can then be played in parallel (``learn=false``).
+The result does not depend on the order in which episodes finish, nor on their place. Episodes are
+independent of each other, except those of a learning agent, whose memory goes from one of its
+episodes to the next: they are played in sequence while the episodes of others fill the executor.
+Its final knowledge can then be played in parallel (``learn=false``).
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ from cavsumo.batch.prepared import PreparedBatch
 from cavsumo.batch.worker import play
 from cavsumo.errors import BatchError, CavsumoError
 
-POLL_S = 0.2  # how often to look whether to stop, while nothing finishes
+POLL_S = 0.2  # interval of checks whether to stop, while no episode finishes
 
 
 def run_batch(
@@ -42,14 +42,15 @@ def run_batch(
 ) -> Iterator[Answer]:
     """The answers of a batch in the order of ``todo``.
 
-    Closing the iterator gives up what has not come out yet.
+    Closing the iterator gives up the answers that it has not yet returned.
 
     Args:
         executor: plays jobs by ``cavsumo.batch.worker.play``, in threads or in processes anywhere.
         todo: numbers of episodes, ascending.
-        memories: what learning agents know already, by name.
-        ahead: how many episodes to have under way or waiting for their turn to come out.
-        stopped: asked all the time; once true, what runs is finished and nothing more is begun.
+        memories: the knowledge of learning agents, by name.
+        ahead: number of episodes that run or wait for their turn.
+        stopped: called all the time; once true, running episodes are finished and no more are
+            begun.
     """
     line = _Line(prepared, executor, todo, dict(memories or {}))
     try:
@@ -68,10 +69,9 @@ def run_batch(
 
 @dataclass
 class _Entry:
-    """Episodes that are played together, between being asked for and coming out.
+    """Episodes that are played together, from the request to the answer.
 
-    One episode, unless episodes share a simulation: then all of those, of which only ``wanted``
-    come out.
+    One episode, or all episodes that share a simulation, of which only ``wanted`` are returned.
     """
 
     wanted: tuple[int, ...]
@@ -81,7 +81,7 @@ class _Entry:
 
 
 class _Line:
-    """Episodes in the order in which they come out; each is submitted as soon as it can be."""
+    """Episodes in the order of their answers; each is submitted as soon as possible."""
 
     def __init__(
         self,
@@ -103,13 +103,13 @@ class _Line:
         for entry in self.entries:
             if entry.answers is None and entry.agent in self._learners:
                 if entry.agent in learning:
-                    continue  # its turn comes when it knows what the episode before teaches
+                    continue  # it can start when it has the memory of the episode before
                 learning.add(entry.agent)
             if entry.future is None:
                 self._submit(entry)
 
     def advance(self) -> None:
-        """Wait a moment for something to finish."""
+        """Wait a short time for an episode to finish."""
         waiting = [e for e in self.entries if e.future is not None and e.answers is None]
         wait([e.future for e in waiting if e.future], POLL_S, return_when=FIRST_COMPLETED)
         for entry in waiting:
@@ -119,13 +119,13 @@ class _Line:
                     self.memories[entry.agent] = entry.answers[-1].memory
 
     def ready(self) -> Iterator[Answer]:
-        """What can come out: all that is finished before the first that is not."""
+        """The entries to return: all that are finished before the first that is not."""
         while self.entries and (answers := self.entries[0].answers) is not None:
             self.entries.popleft()
             yield from answers
 
     def call_off(self) -> None:
-        """Drop what has not started, and what would come out behind it."""
+        """Drop the entries that have not started, and all entries after them."""
         for place, entry in enumerate(self.entries):
             if entry.answers is None and (entry.future is None or entry.future.cancel()):
                 for later in list(self.entries)[place:]:
@@ -152,11 +152,11 @@ class _Line:
         """Hand an entry to the executor."""
         try:
             entry.future = self.executor.submit(play, self.prepared, self._jobs(entry))
-        except RuntimeError as error:  # as executors say that they are shut down or broken
+        except RuntimeError as error:  # the error of executors that are shut down or broken
             raise BatchError(f"the executor takes no more episodes: {error}") from error
 
     def _answers(self, entry: _Entry, future: Future[list[Answer]]) -> list[Answer]:
-        """The answers of an entry; what the executor lost are errors of its episodes."""
+        """The answers of an entry; episodes lost by the executor are errors."""
         try:
             answers = future.result()
         except (CancelledError, BrokenExecutor, OSError) as error:

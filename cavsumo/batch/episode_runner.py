@@ -1,7 +1,8 @@
-"""A plan set up in the process that simulates: from a job to an episode to a row."""
+"""A plan set up in the simulating process: from a job to an episode to a row."""
 
 from __future__ import annotations
 
+import itertools
 import time
 from collections.abc import Callable, Sequence
 from functools import cached_property
@@ -22,6 +23,7 @@ from cavsumo.results.rows import Outcome
 from cavsumo.results.traces import frame, origin, trace_head, trace_text
 from cavsumo.simulation.avoidability import AvoidabilityCheck
 from cavsumo.simulation.loop import Episode, play
+from cavsumo.simulation.playback import played_back, recorded
 from cavsumo.simulation.setup import make_setup
 
 
@@ -41,14 +43,14 @@ class EpisodeRunner:
 
     @cached_property
     def _origin(self) -> dict[str, Any]:
-        """What the traces of all episodes have in common."""
+        """The common part of the traces of all episodes."""
         return origin(self.plan, self.setup.site, self.prepared.checksums)
 
     def try_out(self, *, strict: bool = True) -> None:
-        """Start the ego and SUMO once: what they refuse comes out before anything is written.
+        """Start the ego and SUMO once, so that refusals precede the first written row.
 
-        In the middle of a batch, not ``strict``, an ego that cannot be started is no refusal: each
-        episode tries again, and is an error if that fails.
+        In the middle of a batch (not ``strict``) an ego that cannot be started does not refuse the
+        batch: each episode tries again, and is an error if that fails.
         """
         try:
             self.setup.ego.prepare(self.setup.mission)
@@ -61,7 +63,7 @@ class EpisodeRunner:
         self.setup.world.reset(episode_seed(self.plan.seed, 0), (), (), simulation=simulation)
 
     def play(self, job: Job, beat: Callable[[], None] = lambda: None) -> Answer:
-        """Play a job; ``beat`` is called whenever another simulation begins for it."""
+        """Play a job; ``beat`` is called when another simulation begins for it."""
         begun = time.perf_counter()
         log = ""
         try:
@@ -70,18 +72,23 @@ class EpisodeRunner:
             own = job.simulation == "own"
             record = job.record or (self.plan.trace != "none" and own)
             retry = own and self.plan.reference != "none"
-            episode = play(
-                self.setup, agents, job.seed, record=record, keep=retry, simulation=job.simulation
-            )
+            if job.recorded is not None:
+                episode = played_back(self.setup, job.recorded)
+            else:
+                how: dict[str, Any] = {"keep": retry, "simulation": job.simulation}
+                episode = play(self.setup, agents, job.seed, record=record, **how)
             memory = _recall(agents)
             log = self.setup.ego.take_log()
             avoidability = None
             if retry and episode.outcome == VIOLATED:
-                retrial = AvoidabilityCheck(self.setup, agents, job.seed, record, episode, beat)
+                demand = job.recorded.departures if job.recorded else None
+                retrial = AvoidabilityCheck(
+                    self.setup, agents, job.seed, record, episode, beat, demand
+                )
                 avoidability = retrial.judged(REFERENCES.make(self.plan.reference, {}))
             row = row_of(finished(self.plan, job, episode, avoidability))
             trace = self._trace(job, row, before, episode) if record else ""
-        except Exception as error:  # whatever it is, it costs this row and no other
+        except Exception as error:  # any error costs this row and no other
             said = str(error) if isinstance(error, CavsumoError) else f"defect: {error!r}"
             row, trace = row_of(finished(self.plan, job, error=said)), ""
             memory = job.memory
@@ -90,8 +97,8 @@ class EpisodeRunner:
         return Answer(Outcome(row, trace, log or said_later), memory)
 
     def _team(self, label: str) -> tuple[list[Agent], Memory | None]:
-        """The agents of a label, and what they knew when they were built; fresh copies of one that
-        was given as an object.
+        """The agents of a label, and their knowledge when they were built; fresh copies of an agent
+        that was given as an object.
         """
         member = self.prepared.cast[label]
         if label not in self._agents or is_instance(member.name):
@@ -109,13 +116,15 @@ class EpisodeRunner:
 
     def _trace(self, job: Job, row: Row, memory: Any, episode: Episode) -> str:
         """The frames worth keeping: of tests found, or of every episode if asked."""
-        if episode.frames and (job.record or episode.judgement.triggered):
-            first = trace_head(self._origin, row, memory, episode.frames)
-            return trace_text(first, map(frame, episode.frames))
-        return ""
+        if not (episode.frames and (job.record or episode.judgement.triggered)):
+            return ""
+        played = recorded(self.setup, episode, job.seed, episode.departures)
+        first = trace_head(self._origin, row, memory, episode.frames, played)
+        frames = itertools.zip_longest(episode.frames, played.actions, fillvalue=())
+        return trace_text(first, itertools.starmap(frame, frames))
 
 
 def _recall(agents: Sequence[Agent]) -> Memory | None:
-    """What the agents learned, None when none of them does."""
+    """The knowledge of the agents, None when none of them learns."""
     memory = tuple(agent.recall() for agent in agents)
     return None if all(m is None for m in memory) else memory

@@ -1,4 +1,4 @@
-"""Ctrl-C, and the signals by which schedulers end a job: first finish what runs, then stop."""
+"""Ctrl-C, and the signals by which schedulers end a job: finish running episodes, then stop."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ class Interrupts:
         self.asked, self._quiet = False, quiet
 
     def __call__(self) -> bool:
-        """Whether somebody asked to stop."""
+        """Whether the user asked to stop."""
         return self.asked
 
     def __enter__(self) -> Interrupts:

@@ -1,6 +1,6 @@
-"""One episode as a job: which it is, and its row when it fails.
+"""One episode as a job, and its row if it fails.
 
-Imported by the parent process, so nothing here touches SUMO.
+Imported by the parent process, so this file does not import SUMO.
 """
 
 from __future__ import annotations
@@ -8,6 +8,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
+from cavsumo.agents.recorded import Recorded
 from cavsumo.model.labels import labelled
 from cavsumo.model.scenario import BatchPlan, Simulation
 from cavsumo.model.seeds import episode_seed
@@ -19,7 +20,7 @@ if TYPE_CHECKING:
     from cavsumo.simulation.avoidability import Avoidability
     from cavsumo.simulation.loop import Episode
 
-Memory = tuple[Any, ...]  # what the agents of an episode know, as plain data, agent by agent
+Memory = tuple[Any, ...]  # the knowledge of an episode's agents, as plain data, agent by agent
 
 
 @dataclass(frozen=True)
@@ -30,9 +31,10 @@ class Job:
         run: its number in the batch.
         agent: the tester agent's label.
         seed: the episode's seed.
-        memory: what the agents learned in earlier episodes; None for nothing.
-        record: keep the frames whatever happens.
+        memory: the agents' knowledge from earlier episodes; None for none.
+        record: keep the frames in any case.
         simulation: "own", or "new" to start one that later jobs share as the "same".
+        recorded: an episode to play back instead of asking the agents; None to ask them.
     """
 
     run: int
@@ -41,12 +43,13 @@ class Job:
     memory: Memory | None = None
     record: bool = False
     simulation: Simulation = "own"
+    recorded: Recorded | None = None
 
 
 def job(plan: BatchPlan, run: int, memory: Memory | None = None) -> Job:
-    """The run-th episode of a batch: agents take turns, so run i stays what it is for any N.
+    """The run-th episode of a batch: agents take turns, so run i is the same for any N.
 
-    ``memory``: what earlier episodes taught, unless the plan says what is known in all of them.
+    ``memory``: knowledge from earlier episodes, unless the plan fixes it for all episodes.
     """
     episode, which = divmod(run, len(plan.agents))
     seed, label = episode_seed(plan.seed, episode), labelled(plan.agents[which])[0]
@@ -61,7 +64,7 @@ def finished(
     avoidability: Avoidability | None = None,
     error: str = "",
 ) -> FinishedEpisode:
-    """A job with what came of it: an episode, or why there is none."""
+    """A job with its result: an episode, or the reason why there is none."""
     fresh = job.simulation == "own"
     return FinishedEpisode(plan, job.run, job.agent, job.seed, fresh, episode, avoidability, error)
 

@@ -1,7 +1,7 @@
-"""What learning agents know, kept beside the rows, so that a batch can go on where it stopped.
+"""The knowledge of learning agents, kept beside the rows, so that a batch can be continued.
 
-The manifest holds what they knew after some episode. Episodes between that one and the last row
-are played once more, for the lesson only.
+The manifest holds their knowledge after some episode. Episodes between that one and the last row
+are played once more, only to learn from them.
 """
 
 from __future__ import annotations
@@ -14,16 +14,16 @@ from cavsumo.batch.dispatch import run_batch
 from cavsumo.batch.prepared import PreparedBatch
 from cavsumo.batch.tally import Row
 
-CHECKPOINT_EVERY = 20  # lessons between two notes of what is known
+CHECKPOINT_EVERY = 20  # learning episodes between two records of the knowledge
 
 
-class Lessons:
-    """What the learning agents of a batch know.
+class Knowledge:
+    """The knowledge of the learning agents of a batch.
 
     Attributes:
-        memories: by agent, what it knows.
-        after: by agent, the episode that taught it last.
-        owed: episodes whose rows are there and whose lesson is not.
+        memories: by agent, its knowledge.
+        after: by agent, the last episode from which it learned.
+        owed: episodes with a recorded row from which the agents have not learned.
     """
 
     def __init__(self, prepared: PreparedBatch, recorded: Mapping[str, Any]) -> None:
@@ -35,13 +35,13 @@ class Lessons:
         self._prepared, self._unnoted = prepared, 0
 
     def seen(self, row: Row) -> None:
-        """A row that was there already."""
+        """Take up a recorded row."""
         run, agent = int(row["run"]), row["agent"]
         if agent in self.names and run > self.after[agent] and row["outcome"] != "error":
             self.owed.append(run)
 
     def learned(self, row: Row, memory: Any) -> bool:
-        """An episode was played; whether it taught something."""
+        """Take up a played episode; returns whether an agent learned from it."""
         if row["agent"] not in self.names:
             return False
         self.memories[row["agent"]], self.after[row["agent"]] = memory, row["run"]
@@ -50,21 +50,21 @@ class Lessons:
 
     @property
     def due(self) -> bool:
-        """Whether it is time to note what is known."""
+        """Whether it is time to record the knowledge."""
         return self._unnoted >= CHECKPOINT_EVERY
 
     def catch_up(self, executor: Executor) -> None:
-        """Play the episodes whose lesson is owed."""
+        """Play the episodes from which the agents have not learned."""
         for answer in run_batch(self._prepared, executor, self.owed, memories=self.memories):
             self.learned(answer.outcome.row, answer.memory)
         self.owed = []
 
     def known(self) -> tuple[dict[str, Any], dict[str, int]]:
-        """What is known now, to be restored later."""
+        """The present knowledge, for ``restore``."""
         return dict(self.memories), dict(self.after)
 
     def restore(self, known: tuple[dict[str, Any], dict[str, int]]) -> None:
-        """Know what was known then."""
+        """Restore an earlier knowledge."""
         self.memories, self.after = known
 
     def forget(self, names: Iterable[str]) -> None:
@@ -73,6 +73,6 @@ class Lessons:
             self.memories.pop(name, None)
 
     def facts(self) -> dict[str, Any]:
-        """What is known, for the manifest."""
+        """The knowledge, for the manifest."""
         self._unnoted = 0
         return {"learned": dict(self.memories), "learned_after": dict(self.after)}

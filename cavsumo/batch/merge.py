@@ -1,4 +1,4 @@
-"""Shards put together: the results file that a single run would have written."""
+"""Merging shards into the results file that a single run would have written."""
 
 from __future__ import annotations
 
@@ -14,6 +14,7 @@ from cavsumo.batch.tally import Tally
 from cavsumo.errors import ResultsError
 from cavsumo.results.provenance import differences
 from cavsumo.results.reading import ego_log_name, inside, whole_lines
+from cavsumo.results.recorded_plan import recorded_plan
 from cavsumo.results.rows import Outcome
 from cavsumo.results.writing import Recorder
 
@@ -23,11 +24,13 @@ Numbered = tuple[int, int, dict[str, str]]  # run, which part, row
 
 
 def merged(parts: Sequence[Path], output: Path, *, overwrite: bool) -> Ended:
-    """Check that the parts make a whole, then write it; raises ResultsError if they do not."""
+    """Check that the parts are complete, then write the whole; raises ResultsError if not."""
     if output.resolve() in [part.resolve() for part in parts]:
         raise ResultsError(f"output {str(output)!r}: is one of the parts")
     whole = _whole_manifest(parts)
     _check_whole(parts, whole)
+    if not overwrite:
+        check_kept(output, whole)
     tally = Tally()
     with Recorder(output) as recorder:
         recorder.begin(whole, overwrite=overwrite)
@@ -113,7 +116,7 @@ def _trace_of(part: Path, row: dict[str, str]) -> str:
 
 
 def _log_of(part: Path, run: int) -> str:
-    """What the ego printed in an episode, empty for nothing."""
+    """The ego's output in an episode, empty for none."""
     file = inside(part, ego_log_name(part, run))
     try:
         return file.read_text(encoding="utf-8") if file.exists() else ""

@@ -1,7 +1,7 @@
-"""What crosses to a process that simulates and back: a task, and what it replies.
+"""The messages to a simulating process and back: a task and a reply.
 
-Each is pickled once. A row and the text of a trace are made where the episode was played, and pass
-as they are into the files; the batch is packed by ``PreparedBatch``.
+Each is pickled once. A row and the text of a trace are made in the simulating process and pass
+unchanged into the files; ``PreparedBatch`` packs the batch.
 """
 
 from __future__ import annotations
@@ -18,11 +18,11 @@ State = Literal["ready", "refused", "goes on", "played", "goodbye"]
 
 @dataclass(frozen=True)
 class Task:
-    """What a process is asked: first to make ready for a batch, then to play its episodes.
+    """A task for a process: first to prepare for a batch, then to play its episodes.
 
     Attributes:
-        batch: what to make ready for, in the first task only.
-        strict: whether an ego that cannot be started is a reason to refuse the batch.
+        batch: the batch to prepare for, in the first task only.
+        strict: whether an ego that cannot be started refuses the batch.
         job: the episode to play, in every later task.
     """
 
@@ -33,11 +33,11 @@ class Task:
 
 @dataclass(frozen=True)
 class Answer:
-    """What an episode came to.
+    """The result of an episode.
 
     Attributes:
         outcome: its row, trace and log.
-        memory: what its agents know afterwards; None where none of them learns.
+        memory: the knowledge of its agents afterwards; None if none of them learns.
     """
 
     outcome: Outcome
@@ -46,13 +46,13 @@ class Answer:
 
 @dataclass(frozen=True)
 class Reply:
-    """What a process says.
+    """The reply of a process.
 
     Attributes:
         state: "ready" or "refused": the answer to the first task; "goes on": another simulation
-            begins for the same job; "played"; "goodbye": it had nothing to do for long, and goes.
-        reason: why the batch is refused, in one sentence.
-        answer: what came of the episode that was played.
+            begins for the same job; "played"; "goodbye": it was idle for long, and ends.
+        reason: the reason of a refusal, in one sentence.
+        answer: the result of the episode.
     """
 
     state: State

@@ -1,4 +1,4 @@
-"""Batches that were checked, played one after another: the command and the Python interface."""
+"""Playing checked batches one after another, for the command and the Python interface."""
 
 from __future__ import annotations
 
@@ -9,7 +9,8 @@ from cavsumo.batch.batch_run import BatchRun
 from cavsumo.batch.ended import Ended
 from cavsumo.batch.executors import Means, opened
 from cavsumo.batch.interrupts import Interrupts
-from cavsumo.batch.preflight import CheckedBatch, Manner
+from cavsumo.batch.manner import Manner, Means
+from cavsumo.batch.preflight import CheckedBatch
 from cavsumo.batch.prepared import PreparedBatch
 from cavsumo.batch.stopping import looks_at_rows
 from cavsumo.batch.worker import try_out
@@ -17,7 +18,7 @@ from cavsumo.egos.ego_files import OutputWatch
 from cavsumo.errors import CavsumoError, InputError
 from cavsumo.results.writing import Recorder
 
-Announce = Callable[[CheckedBatch, int], None]  # given a batch that begins, and the jobs at a time
+Announce = Callable[[CheckedBatch, int], None]  # a batch, and the jobs at a time
 
 
 def played(
@@ -26,7 +27,7 @@ def played(
     manner: Manner,
     announce: Announce = lambda batch, jobs: None,
 ) -> tuple[list[Ended], bool]:
-    """Play batches that were checked; what they came to, and whether that was cut short."""
+    """Play checked batches; returns their results, and whether the user stopped them."""
     ended: list[Ended] = []
     with opened(means) as (executor, jobs), Interrupts(manner.quiet) as interrupts:
         batches = [_tried_out(executor, batch) for batch in batches]
@@ -39,7 +40,7 @@ def played(
 
 
 def _tried_out(executor: Executor, batch: CheckedBatch) -> CheckedBatch:
-    """Have the batch loaded once, where it will be played; what the ego wrote is no input."""
+    """Load the batch once by its executor; files that the ego wrote meanwhile are not inputs."""
     _try_out(executor, batch.prepared)
     known = batch.prepared.checksums
     written = OutputWatch(batch.prepared.plan.scenario.ego, known).outputs()
@@ -49,12 +50,12 @@ def _tried_out(executor: Executor, batch: CheckedBatch) -> CheckedBatch:
 
 
 def _try_out(executor: Executor, prepared: PreparedBatch) -> None:
-    """Have the batch loaded once."""
+    """Load the batch once."""
     try:
         executor.submit(try_out, prepared).result()
     except CavsumoError:
         raise
-    except Exception as error:  # anything that keeps an executor's processes from playing
+    except Exception as error:  # any error that prevents an executor's processes from playing
         raise InputError(f"the executor cannot play: {type(error).__name__}: {error}") from error
 
 
@@ -66,7 +67,7 @@ def _play(
     manner: Manner,
     announce: Announce,
 ) -> Ended:
-    """Play a batch into its file, or what is left of it."""
+    """Play a batch, or the rest of it, into its file."""
     prepared = batch.prepared
     with Recorder(batch.output) as recorder:
         batch_run = BatchRun(prepared, recorder, executor, jobs, interrupts, manner.quiet)
@@ -91,13 +92,13 @@ def _play(
 
 
 def _carry_out(batch_run: BatchRun, manner: Manner) -> None:
-    """Do what was asked for, and complete the manifest whatever happens."""
+    """Play or retry, and complete the manifest in any case."""
     try:
         if manner.retry_errors:
             batch_run.retry()
         if manner.resume or not manner.retry_errors:
             batch_run.play()
-    except KeyboardInterrupt:  # twice: what runs is given up
+    except KeyboardInterrupt:  # twice: running episodes are given up
         batch_run.status = "interrupted"
     finally:
         batch_run.end()

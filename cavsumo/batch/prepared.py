@@ -1,4 +1,4 @@
-"""A plan that was checked, with all that a process needs to play it, and what identifies it."""
+"""The prepared batch: a checked plan with all data that a process needs to play it."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ import numpy as np
 
 from cavsumo.agents.casting import Cast, resolve_cast
 from cavsumo.agents.manoeuvres import types_for
-from cavsumo.assertions import make_assertions
+from cavsumo.assertions.specs import assertions_of
 from cavsumo.batch.plan_names import check_names
 from cavsumo.egos import make_ego
 from cavsumo.egos.base import Ego
@@ -33,21 +33,21 @@ from cavsumo.results.provenance import checksums, traffic_checksum, unequal, ver
 from cavsumo.sumo.demand import BEYOND_S
 from cavsumo.sumo.options import OPTIONS
 
-OUTPUTS = "ego_outputs"  # in a manifest: the files of its command that the ego wrote
+OUTPUTS = "ego_outputs"  # in a manifest: the files of its command that an ego wrote
 
 
 @dataclass(frozen=True)
 class PreparedBatch:
-    """What a process needs to play the jobs of a batch.
+    """The data that a process needs to play the jobs of a batch.
 
     Attributes:
-        plan, cast, site: what is played, by which agents, and where.
+        plan, cast, site: the plan, its agents and its place.
         folder: the working folder that the plan's files are relative to.
-        checksums: of the plan's files, so that a process elsewhere notices other ones.
-        versions: of what the results depend on.
-        machine: that on which it was prepared; files that an ego writes differ on others.
+        checksums: of the plan's files, so that a process elsewhere notices different ones.
+        versions: of the packages on which results depend.
+        machine: the one on which it was prepared; files that an ego writes differ on others.
         objects: the agents, the ego and the assertions that are objects of a Python session.
-        key: stands for all of it.
+        key: identifies all of it.
     """
 
     plan: BatchPlan
@@ -66,7 +66,7 @@ class PreparedBatch:
 
     @cached_property
     def packed(self) -> bytes:
-        """The batch as every process gets it, pickled once for all of them."""
+        """The batch for the processes, pickled once for all of them."""
         return pickle.dumps({f.name: getattr(self, f.name) for f in dataclasses.fields(self)})
 
     def __reduce__(self) -> tuple[Any, ...]:
@@ -75,7 +75,7 @@ class PreparedBatch:
     def check_here(self) -> None:
         """Raise InputError unless this process sees the same inputs and versions.
 
-        What the ego may have written since is no input (``ego_files``).
+        Files that the ego may have written since are not inputs (``ego_files``).
         """
         found = {**versions(), **checksums(self.plan.scenario, self.cast.files)}
         free = self._written_here()
@@ -91,13 +91,13 @@ class PreparedBatch:
         return {str(file) for file in data_files(self.plan.scenario.ego)}
 
     def without(self, outputs: Collection[str]) -> PreparedBatch:
-        """The same batch, but some files are no inputs."""
+        """The same batch, without some files as inputs."""
         kept = {name: sum for name, sum in self.checksums.items() if name not in outputs}
         return dataclasses.replace(self, checksums=kept)
 
 
 def _unpacked(packed: bytes) -> PreparedBatch:
-    """A batch that came from another process; it goes on to a third one as it came."""
+    """A batch from another process; it is sent to a third one unchanged."""
     batch = object.__new__(PreparedBatch)
     batch.__dict__.update(pickle.loads(packed), packed=packed)
     return batch
@@ -113,9 +113,7 @@ def prepare(plan: BatchPlan, ego: Ego | None = None) -> PreparedBatch:
     cast = resolve_cast(plan)
     for member in cast:
         member.make().prepare()
-    make_assertions(
-        scenario.assertions, scenario.assertion_params, scenario.formulas, scenario.step_length
-    )
+    assertions_of(scenario)
     kind = kind_named(scenario.kind)
     _check_kind(scenario, kind, cast)
     if cast.learners and (plan.shard or plan.reset == "shared"):
@@ -134,7 +132,7 @@ def prepare(plan: BatchPlan, ego: Ego | None = None) -> PreparedBatch:
     site = derive_site(scenario.net_file, scenario.ego_route, scenario.junction, ego.kind, asked)
     if scenario.embodiment == "person" and not all(area.walk for area in site.areas):
         raise InputError("jaywalk: embodiment person needs a pavement near by, and there is none")
-    if site.approaches:  # that there is room for them must not come out an episode at a time
+    if site.approaches:  # missing room must be found before the first episode
         kinds, rng = [kind] * scenario.testers, np.random.default_rng(plan.seed)
         site.draw(kinds, ego.kind, scenario.start_speed, rng)
     inputs = checksums(scenario, cast.files)
@@ -143,7 +141,7 @@ def prepare(plan: BatchPlan, ego: Ego | None = None) -> PreparedBatch:
 
 
 def wishes(plan: BatchPlan, kind: Kind, ego: Ego, manoeuvres: Set[str]) -> Wishes:
-    """What a plan asks of its site besides the route."""
+    """The requirements of a plan on its site besides the route."""
     scenario = plan.scenario
     volume = None
     if scenario.traffic is not None:
@@ -160,7 +158,7 @@ def wishes(plan: BatchPlan, kind: Kind, ego: Ego, manoeuvres: Set[str]) -> Wishe
 
 
 def _top_speed(ego: Ego) -> float:
-    """The speed that an ego never exceeds [m/s]; what is no number SUMO will refuse."""
+    """The speed that an ego never exceeds [m/s]; SUMO refuses other values than numbers."""
     try:
         return min(ego.kind.v_max, float(ego.vtype().get("maxSpeed", math.inf)))
     except ValueError:
@@ -168,7 +166,7 @@ def _top_speed(ego: Ego) -> float:
 
 
 def _check_kind(scenario: Scenario, kind: Kind, cast: Cast) -> None:
-    """Refuse what walkers or vehicles cannot do."""
+    """Refuse settings that pedestrians or vehicles cannot have."""
     if scenario.jaywalk and kind.name not in WALKING:
         raise InputError(f"jaywalk: only {' and '.join(WALKING)}s start beside the road")
     if kind.name in WALKING:
@@ -184,10 +182,9 @@ def _check_kind(scenario: Scenario, kind: Kind, cast: Cast) -> None:
 
 
 def approach_types(scenario: Scenario, kind: Kind, manoeuvres: Set[str]) -> tuple[str, ...]:
-    """The types of approach of a scenario's vehicles; empty for all types, and for walkers.
+    """The types of approach of a scenario's vehicles; empty for all types, and for pedestrians.
 
-    Those that the scenario names, else those on which all agents can do the one manoeuvre that is
-    asked of them.
+    Those that the scenario names, else those on which the one manoeuvre of all agents is possible.
     """
     if scenario.approaches or kind.name in WALKING:
         return scenario.approaches
@@ -195,7 +192,7 @@ def approach_types(scenario: Scenario, kind: Kind, manoeuvres: Set[str]) -> tupl
 
 
 def manifest(prepared: PreparedBatch) -> dict[str, Any]:
-    """What makes a batch reproducible."""
+    """The manifest: the data that make a batch reproducible."""
     return {
         "command": ["cavsumo", *sys.argv[1:]],
         "plan": prepared.plan.model_dump(mode="json"),

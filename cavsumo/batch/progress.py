@@ -17,11 +17,11 @@ from cavsumo.batch.tally import Tally
 
 
 class Progress:
-    """Episodes, rate, time left, and what was found; a context manager.
+    """Progress display: episodes, rate, time left, and results; a context manager.
 
     Args:
-        total: how many episodes there are at most.
-        done: how many of them were played before.
+        total: largest number of episodes.
+        done: number of those played before.
     """
 
     def __init__(self, total: int, quiet: bool, done: int = 0) -> None:
@@ -70,7 +70,7 @@ class Progress:
 
 
 class _NotebookBar:
-    """A bar below the cell that runs, by IPython alone: rich needs ipywidgets for one."""
+    """A bar below the running cell, by IPython alone, because rich needs ipywidgets for one."""
 
     EVERY_S = 0.1  # of real time, it is drawn anew
 
@@ -85,7 +85,7 @@ class _NotebookBar:
             self._draw(f'<progress value="{done}" max="{total}"></progress> {escape(line)}')
 
     def clear(self) -> None:
-        """Take it away."""
+        """Remove it."""
         if self._handle is not None:
             self._draw("")
 
@@ -99,7 +99,7 @@ class _NotebookBar:
 
 
 def _found(tally: Tally) -> str:
-    """What was found so far."""
+    """The results so far."""
     found = tally.all
     judged = bool(found.preventable or found.unpreventable)
     failures = (found.preventable, "preventable failure") if judged else (found.failures, "failure")
@@ -115,7 +115,7 @@ def _duration(seconds: float) -> str:
 
 
 def is_shown() -> bool:
-    """Whether there is a bar: somebody looks at a terminal or at a notebook."""
+    """Whether there is a bar: on a terminal or in a notebook."""
     return sys.stderr.isatty() or in_notebook()
 
 

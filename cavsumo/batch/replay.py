@@ -1,4 +1,4 @@
-"""Recorded episodes: found in results or alone in a trace, played again, compared bit for bit."""
+"""Recorded episodes: read from results or a trace, played again, compared bit for bit."""
 
 from __future__ import annotations
 
@@ -15,27 +15,29 @@ from cavsumo.batch.prepared import PreparedBatch, prepare
 from cavsumo.batch.trust import check_trust
 from cavsumo.batch.worker import Worker, search
 from cavsumo.errors import DivergenceError, InputError, ResultsError
+from cavsumo.model.bodies import STEERING, THROTTLE
 from cavsumo.model.checksums import checksum
 from cavsumo.model.named_networks import check_network, network_file, routes_file
 from cavsumo.model.scenario import BatchPlan, Scenario
 from cavsumo.results.columns import COLUMNS, Row
-from cavsumo.results.reading import STARTING, inside, read_manifest, read_rows
+from cavsumo.results.reading import inside, read_rows
+from cavsumo.results.recorded_plan import recorded_plan
 from cavsumo.results.rows import cell
 from cavsumo.results.traces import NOT_REPLAYED, Trace, parsed, read_trace
 
 
 @dataclass(frozen=True)
 class Record:
-    """An episode as it was recorded.
+    """A recorded episode.
 
     Attributes:
         plan: of its batch.
         row: the episode's row, as text.
         trace: its trace, None when none was kept.
         origin: the batch's manifest, or the trace's head: versions and checksums.
-        file: where it was found.
+        file: the file that contains it.
         alone: whether that is a trace, without the episodes before it.
-        allowed: the egos and assertions from outside that it may use; None for all (``trust``).
+        allowed: the external egos and assertions that it may use; None for all (``trust``).
     """
 
     plan: BatchPlan
@@ -53,21 +55,21 @@ class Record:
 
     @property
     def command(self) -> str:
-        """What plays it again."""
+        """The command that replays it."""
         return f"cavsumo replay {shlex.quote(self.file.name)}" + (
             "" if self.alone else f" {self.run}"
         )
 
 
 class Replayed(NamedTuple):
-    """An episode that was played again: its row, and its trace, None when an error left none."""
+    """An episode that was played again: its row, and its trace, None after an error."""
 
     row: Row
     trace: Trace | None
 
 
 class Difference(NamedTuple):
-    """Where a replay first departs from the record; see ``DivergenceError``."""
+    """The first difference of a replay from the record; see ``DivergenceError``."""
 
     place: str
     what: str
@@ -87,17 +89,6 @@ def recorded(csv_file: Path, run: int, allowed: Collection[str] | None = ()) -> 
     return Record(plan, row, trace, manifest, csv_file, allowed=allowed)
 
 
-def recorded_plan(csv_file: Path) -> tuple[BatchPlan, dict[str, Any]]:
-    """The plan of a batch, and its manifest."""
-    manifest = read_manifest(csv_file)
-    if manifest.get("status") == STARTING:
-        raise ResultsError(f"results {str(csv_file)!r}: a batch that was killed as it started")
-    try:
-        return BatchPlan.model_validate(manifest["plan"]), manifest
-    except (KeyError, ValueError) as error:
-        raise ResultsError(f"manifest of {str(csv_file)!r}: holds no valid plan") from error
-
-
 def recorded_row(csv_file: Path, run: int) -> dict[str, str]:
     """The row of an episode."""
     rows = {row.get("run"): row for row in read_rows(csv_file)}
@@ -106,8 +97,13 @@ def recorded_row(csv_file: Path, run: int) -> dict[str, str]:
     return rows[str(run)]
 
 
-def recorded_alone(file: Path, allowed: Collection[str] | None = ()) -> Record:
-    """The episode in a trace; raises ResultsError when it cannot be played from that alone."""
+def recorded_alone(
+    file: Path, allowed: Collection[str] | None = (), *, anew: bool = True
+) -> Record:
+    """The episode in a trace; raises ResultsError when it cannot be played from that alone.
+
+    ``anew``: whether its agents are to play, and not only what they did.
+    """
     trace, name = read_trace(file), f"trace {str(file)!r}"
     head = trace.head
     try:
@@ -123,20 +119,19 @@ def recorded_alone(file: Path, allowed: Collection[str] | None = ()) -> Record:
             f"{name}: was played in a simulation that other episodes used before; replay it from "
             "its results"
         )
-    if not kept:
+    if anew and not kept:
         raise ResultsError(
             f"{name}: does not hold what agent {row['agent']} had learned before, which is large; "
-            "replay it from its results"
+            "replay it from its results, or play it back with --playback"
         )
     return Record(plan, row, trace, head, file, alone=True, allowed=allowed)
 
 
 def located(record: Record, net: Path | None, routes: Path | None) -> Record:
-    """The record with its files where they are here, known by their checksums.
+    """The record with the present paths of its files, identified by their checksums.
 
-    Each is looked for where it is said to be, else where it was recorded and beside the trace; a
-    network that has a name is found by it.
-    Raises InputError when it is nowhere, or another one.
+    Each is searched at the given path, else at its recorded path and beside the trace; a network
+    with a name is found by it. Raises InputError for a missing or different file.
     """
     scenario = record.plan.scenario
     if net is not None:
@@ -158,12 +153,12 @@ def located(record: Record, net: Path | None, routes: Path | None) -> Record:
 
 
 def _files(scenario: Scenario) -> list[Path]:
-    """The files that are looked for."""
+    """The files to find."""
     return [f for f in (scenario.net, scenario.routes, *scenario.additional) if f is not None]
 
 
 def _file(record: Record, option: str, was: Path, given: Path | None) -> Path:
-    """Where a file of a plan is."""
+    """The present path of a plan's file."""
     expected = dict(record.origin.get("sha256") or {}).get(str(was))
     recorded_at = network_file(was) if option == "--net" else routes_file(was)
     if given is None and recorded_at.is_file() and checksum(recorded_at) == expected:
@@ -182,30 +177,35 @@ def _file(record: Record, option: str, was: Path, given: Path | None) -> Path:
     if given:
         raise InputError(f"{option}: no such file: {str(given)!r}")
     how = f"name it with {option} FILE or put it" if option.startswith("--") else "put it"
-    raise InputError(f"{str(record.file)!r} needs {what}, which is not here; {how} beside it")
+    without = ""
+    if option == "--routes" and record.trace is not None and record.trace.has_recording:
+        without = ", or play back who departed with --playback"
+    raise InputError(
+        f"{str(record.file)!r} needs {what}, which is not here; {how} beside it{without}"
+    )
 
 
 # Played again
 
 
 def prepared_again(record: Record) -> PreparedBatch:
-    """What plays a record; raises InputError when that would use what only its file names."""
+    """The prepared batch of a record; raises InputError for names that need ``--trust``."""
     check_trust(record.plan.scenario, record.file, record.allowed)
     return prepare(record.plan)
 
 
 def replayed(worker: Worker, record: Record) -> Replayed:
-    """An episode once more, with all that came before it and matters to it.
+    """An episode once more, after the earlier episodes on which it depends.
 
-    Learners first live through their earlier episodes, or are told what they knew if a trace
-    stands alone; an episode of a shared simulation comes after those before it.
+    Learners first play their earlier episodes, or get their knowledge from the trace if it stands
+    alone; an episode of a shared simulation comes after those before it.
     """
     outcome = _played_again(worker, record).outcome
     return Replayed(outcome.row, parsed(outcome.trace) if outcome.trace else None)
 
 
 def _played_again(worker: Worker, record: Record) -> Answer:
-    """What its worker answers."""
+    """The answer of its worker."""
     plan, run = worker.prepared.plan, record.run
     if record.alone and record.trace is not None:
         row, memory = record.row, record.trace.head["memory"]
@@ -218,7 +218,7 @@ def _played_again(worker: Worker, record: Record) -> Answer:
 
 
 def known(worker: Worker, run: int) -> Memory | None:
-    """What the agents of an episode knew before it; a learner lives through its earlier ones."""
+    """The knowledge of an episode's agents before it; a learner plays its earlier ones."""
     plan, memory = worker.prepared.plan, job(worker.prepared.plan, run).memory
     step = len(plan.agents)
     learns = job(plan, run).agent in worker.prepared.cast.learners
@@ -230,15 +230,18 @@ def known(worker: Worker, run: int) -> Memory | None:
 # Compared
 
 
-def compare(record: Record, again: Replayed) -> None:
-    """Raise DivergenceError at the first difference of a replay from its record."""
+def compare(record: Record, again: Replayed, apart: Collection[str] = ()) -> None:
+    """Raise DivergenceError at the first difference of a replay from its record.
+
+    ``apart``: columns of the row that it need not reproduce.
+    """
     name = f"run {record.run} ({record.row['agent']})"
     if again.row["outcome"] == "error" != record.row["outcome"]:
         said = f"{name} could not be played again: {again.row['error']}"
         raise DivergenceError(said, None, "", "outcome")
     frames = record.trace.frames if record.trace is not None else None
     frames_again = again.trace.frames if again.trace is not None else ()
-    found = first_difference(record.row, frames, again.row, frames_again)
+    found = first_difference(record.row, frames, again.row, frames_again, apart)
     if found is not None:
         place, what, step, body, quantity = found
         raise DivergenceError(f"{name} diverged at {place}: {what}", step, body, quantity)
@@ -249,8 +252,9 @@ def first_difference(
     frames: Sequence[Mapping[str, Any]] | None,
     again: Row,
     frames_again: Sequence[Mapping[str, Any]],
+    apart: Collection[str] = (),
 ) -> Difference | None:
-    """Where a replay departs from the record: the timestep, the body and the quantity."""
+    """The first difference of a replay from its record: the timestep, the body and the quantity."""
     if frames is not None:
         for old, new in zip(frames, frames_again, strict=False):
             for difference in _frame_differences(old, new):
@@ -260,7 +264,9 @@ def first_difference(
             what = f"{len(frames)} frames were recorded, {len(frames_again)} replayed"
             return Difference("the end of the trace", what, end, quantity="frames")
     for column in COLUMNS:
-        if column in NOT_REPLAYED or column not in row:  # of a version before it had the column
+        if column not in row:  # of a version before it had the column
+            continue
+        if column in NOT_REPLAYED or column in apart:
             continue
         if row[column] != cell(again.get(column)):
             what = f"recorded {row[column]!r}, replayed {cell(again.get(column))!r}"
@@ -286,3 +292,19 @@ def _frame_differences(old: Mapping[str, Any], new: Mapping[str, Any]) -> Iterat
             if a != b:
                 what = f"{body}.{name} recorded {a!r}, replayed {b!r}"
                 yield Difference(place, what, step, body, name)
+    yield from _action_differences(old, new, place)
+
+
+def _action_differences(
+    old: Mapping[str, Any], new: Mapping[str, Any], place: str
+) -> Iterator[Difference]:
+    """The differences of what the testers did; a trace of format 1 does not tell."""
+    chosen, chosen_again = old.get("actions", new["actions"]), new["actions"]
+    if len(chosen) != len(chosen_again):
+        what = f"{len(chosen)} actions were recorded, {len(chosen_again)} replayed"
+        yield Difference(place, what, old["step"], quantity="actions")
+    for body, one, again in zip(old["testers"], chosen, chosen_again, strict=False):
+        for name, a, b in zip((THROTTLE, STEERING), one, again, strict=True):
+            if a != b:
+                what = f"{body}.{name} recorded {a!r}, replayed {b!r}"
+                yield Difference(place, what, old["step"], body, name)

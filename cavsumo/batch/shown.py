@@ -1,4 +1,4 @@
-"""Where a recorded episode took place, for showing it: nobody who drove or judged is built."""
+"""The place of a recorded episode, for showing it without building its ego and assertions."""
 
 from __future__ import annotations
 
@@ -21,9 +21,9 @@ def is_ours(scenario: Scenario) -> bool:
 
 
 def shown_site(plan: BatchPlan, trace: Trace | None) -> Site:
-    """The site of a plan without its traffic and its lights' programs, which are in the frames.
+    """The site of a plan, without traffic and programs of lights, which are in the frames.
 
-    An ego from outside has the box that a trace tells, else that of cavsumo's egos. Raises
+    An external ego has the box in a trace, else that of built-in egos. Raises
     InputError.
     """
     scenario, kind = plan.scenario, kind_named(plan.scenario.kind)
@@ -34,7 +34,7 @@ def shown_site(plan: BatchPlan, trace: Trace | None) -> Site:
 
 
 def _ego_kind(scenario: Scenario, trace: Trace | None) -> Kind:
-    """The ego's kind, as far as its box goes."""
+    """The ego's kind, with the right box."""
     if is_ours(scenario):
         return EGOS.make(scenario.ego, scenario.ego_params).kind
     if trace is None:

@@ -1,4 +1,4 @@
-"""When a batch is over before its last episode.
+"""Rules that stop a batch before its last episode.
 
 Where a reference driver judges, the first failure that ends a batch is the first preventable one.
 
@@ -19,7 +19,7 @@ Rule = Callable[[Tally], str | None]
 
 
 def stopping_rule(plan: BatchPlan) -> Rule:
-    """All rules of a plan as one: why to stop now, or None.
+    """All rules of a plan as one: the reason to stop now, or None.
 
     The budget's clock starts here.
     """
@@ -36,7 +36,7 @@ def stopping_rule(plan: BatchPlan) -> Rule:
 
 
 def looks_at_rows(plan: BatchPlan) -> bool:
-    """Whether the number of episodes may depend on what they found."""
+    """Whether the number of episodes may depend on their results."""
     given = plan.until_tests, plan.until_half_width, plan.budget_s
     return plan.first or any(value is not None for value in given)
 
@@ -60,7 +60,7 @@ def _enough_tests(wanted: int) -> Rule:
 
 
 def _narrow_enough(text: str, name: str, agents: Sequence[str]) -> Rule:
-    """Every agent's interval at most so wide to either side, on average."""
+    """Stop when the mean half-width of every agent's interval is small enough."""
     assert name in RATES
     limit, relative = half_width(text)
 

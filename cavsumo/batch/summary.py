@@ -1,4 +1,4 @@
-"""The table that ends a run: what each agent found, with intervals."""
+"""The table that ends a run: the results of each agent, with intervals."""
 
 from __future__ import annotations
 
@@ -52,7 +52,7 @@ def summarise(ended: Sequence[Ended]) -> None:
 
 
 def _table(ended: Sequence[Ended]) -> Table:
-    """One line an agent, of each batch."""
+    """One line per agent of each batch."""
     several = any(one.name for one in ended)
     failures = PREVENTABLE if any(one.judged for one in ended) else "failures"
     others = _others(ended)
@@ -90,7 +90,7 @@ def _others(ended: Sequence[Ended]) -> list[str]:
 
 
 def _verdicts(ended: Sequence[Ended]) -> Table:
-    """One line an assertion, agent and batch: in how many episodes it said what."""
+    """One line per assertion, agent and batch: the number of episodes with each verdict."""
     table = Table(box=None, pad_edge=False, padding=(0, 2, 0, 0))
     several = any(one.name for one in ended)
     for title in ("batch", "agent", "assertion") if several else ("agent", "assertion"):
@@ -107,7 +107,7 @@ def _verdicts(ended: Sequence[Ended]) -> Table:
 
 
 def _files(ended: Sequence[Ended]) -> str:
-    """Where the results lie."""
+    """The files of the results."""
     first, last = ended[0], ended[-1]
     if first is not last:
         return f"{first.csv_file} to {last.csv_file.name} ({len(ended)} batches)"
@@ -119,7 +119,7 @@ def _files(ended: Sequence[Ended]) -> str:
 
 
 def _say_shared(ended: Sequence[Ended], console: Console) -> None:
-    """How many tests that were found in shared simulations did not come out again."""
+    """The number of tests from shared simulations that did not occur again."""
     found = [one.tally.all for one in ended if one.shared]
     fresh, tests = sum(one.fresh for one in found), sum(one.tests for one in found)
     if fresh:
@@ -132,7 +132,7 @@ def _say_shared(ended: Sequence[Ended], console: Console) -> None:
 
 
 def _say_invalid(ended: Sequence[Ended], console: Console) -> None:
-    """In how many episodes a tester broke the rules of the world, and the first of them."""
+    """The number of invalid episodes, and the first of them."""
     count = sum(one.tally.all.invalid for one in ended)
     row, where = _first(ended, INVALID)
     if row is not None:
@@ -140,7 +140,7 @@ def _say_invalid(ended: Sequence[Ended], console: Console) -> None:
 
 
 def _say_errors(ended: Sequence[Ended], console: Console) -> None:
-    """How many episodes could not be run, and the first of them."""
+    """The number of error episodes, and the first of them."""
     errors = sum(one.tally.all.errors for one in ended)
     row, where = _first(ended, "error")
     if row is not None:
@@ -152,7 +152,7 @@ def _say_errors(ended: Sequence[Ended], console: Console) -> None:
 
 
 def _first(ended: Sequence[Ended], what: str) -> tuple[Row | None, str]:
-    """The first row of a kind, and of which of several results it is."""
+    """The first row of a kind, and its results file among several."""
     for one in ended:
         row = one.tally.first.get(what)
         if row is not None:
@@ -177,7 +177,7 @@ def _cells(found: Found, sequential: bool, failures: str, others: Sequence[str])
 
 
 def _say_forecasts(one: Ended, console: Console) -> None:
-    """How many starts an agent said to be sure and not forceable, and what became of them."""
+    """The forecasts of an agent, and the tests that resulted."""
     for agent, found in one.tally.agents.items():
         said = {verdict: found.forecasts.get(verdict, Counter()) for verdict in VERDICTS}
         if found.forecasts:

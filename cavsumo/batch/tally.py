@@ -1,4 +1,4 @@
-"""What a batch found so far, counted row by row: small, however many rows there are."""
+"""The counts of a batch so far, row by row, in bounded memory."""
 
 from __future__ import annotations
 
@@ -21,11 +21,11 @@ RATES = ("tests", "preventable", "failures")
 
 @dataclass
 class Found:
-    """What one agent found.
+    """The counts of one agent.
 
     Attributes:
-        outcomes: how often each outcome came out.
-        fresh: how many rows are of episodes in a simulation of their own.
+        outcomes: the number of episodes with each outcome.
+        fresh: the number of rows of episodes in a simulation of their own.
         times: when tests were triggered, by time [s] to three decimals.
         censored: when valid episodes without a test ended, likewise.
         verdicts: for each assertion, how often it said what.
@@ -50,17 +50,17 @@ class Found:
 
     @property
     def episodes(self) -> int:
-        """How many were played."""
+        """The number of episodes played."""
         return self.outcomes.total()
 
     @property
     def valid(self) -> int:
-        """How many count as tried."""
+        """The number of valid episodes."""
         return self.episodes - self.errors - self.invalid
 
     @property
     def tests(self) -> int:
-        """How many were tests."""
+        """The number of tests."""
         return self.outcomes[HELD] + self.outcomes[VIOLATED]
 
     @property
@@ -85,17 +85,17 @@ class Found:
 
     @property
     def unfair(self) -> int:
-        """How many left the ego no chance."""
+        """The number of unfair episodes."""
         return self.outcomes[UNFAIR]
 
     @property
     def invalid(self) -> int:
-        """In how many a tester broke the rules of the world."""
+        """The number of invalid episodes."""
         return self.outcomes[INVALID]
 
     @property
     def errors(self) -> int:
-        """How many could not be played."""
+        """The number of error episodes."""
         return self.outcomes["error"]
 
     def rate(self, name: str, *, sequential: bool = False) -> Rate:
@@ -132,7 +132,7 @@ class Tally:
         self.rows = 0
 
     def add(self, row: Row) -> None:
-        """Count one more row, as it was made or as it was read."""
+        """Count one more row, as made or as read."""
         found = self.agents.setdefault(row["agent"], Found())
         self.rows += 1
         found.outcomes[row["outcome"]] += 1
@@ -174,12 +174,12 @@ class Tally:
 
     @property
     def all(self) -> Found:
-        """What all agents found together."""
+        """The counts of all agents together."""
         return found_by(self.agents.values())
 
 
 def found_by(agents: Iterable[Found]) -> Found:
-    """What several agents found together, but for the times."""
+    """The counts of several agents together, without the times."""
     together = Found()
     for found in agents:
         together.outcomes.update(found.outcomes)

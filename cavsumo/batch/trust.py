@@ -1,7 +1,7 @@
-"""Strangers' files: what playing them would run, import or connect to, and who allowed that.
+"""Trust in files of others: code and addresses that playing them would use, and the permission.
 
-A plan names its ego and its assertions. Built-in names are ours; any other is code or an address
-that came with the file, and is used only when the user repeated it or trusts the file.
+A plan names its ego and its assertions. A name that is not built in is code or an address from the
+file, and is used only if the user repeated it or trusts the file.
 """
 
 from __future__ import annotations
@@ -19,10 +19,11 @@ SHOWN = 120  # characters of a name in a message
 def check_trust(
     scenario: Scenario, file: Path, allowed: Collection[str] | None, *, ego: bool = True
 ) -> None:
-    """Raise InputError when playing a scenario would use what only its file names.
+    """Raise InputError when playing a scenario would use code or an address that only its file
+    names.
 
     Args:
-        file: where the scenario was found.
+        file: the file of the scenario.
         allowed: egos and assertions that the user named as well; None when the file is trusted.
         ego: whether its ego would drive.
     """
@@ -45,7 +46,7 @@ def _is_foreign(name: str) -> bool:
 
 
 def _use(spec: str) -> str:
-    """What using an ego or assertion from outside means."""
+    """The effect of using an external ego or assertion."""
     sort, _, rest = spec.partition(":")
     verb = {"exec": "run", "tcp": "connect to"}.get(sort, "import")
     name = rest if sort in ("exec", "tcp") else spec

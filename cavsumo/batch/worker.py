@@ -1,7 +1,7 @@
-"""A process that simulates, seen from outside: given jobs, watched, ended, replaced.
+"""A simulating process, the calling side: it gets jobs, is watched, ended and replaced.
 
-SUMO can end its whole process (segmentation fault) or never come back (endless loop). So whoever
-wants an episode played waits on a pipe with a deadline, and a crash or a hang costs one row.
+SUMO can end its whole process (segmentation fault) or never return (endless loop). The caller
+therefore waits on a pipe with a deadline, and a crash or a hang costs one row.
 """
 
 from __future__ import annotations
@@ -32,8 +32,8 @@ from cavsumo.model.scenario import Simulation
 from cavsumo.results.rows import is_test
 
 STARTUP_S = 120.0  # imports, SUMO's first start and that of the ego, on a slow machine
-STUCK_S = 20  # how long a message may stop half-way
-DISMISSAL_S = 3.0  # how long a process may take to end by itself
+STUCK_S = 20  # longest interruption of a message
+DISMISSAL_S = 3.0  # time that a process has to end by itself
 ATTEMPTS = 5  # to start a process that dies while it starts
 LIFETIME = 10_000  # episodes that one process plays; SUMO leaks a little with every restart
 
@@ -78,7 +78,7 @@ class Worker:
                 return Answer(failed(self.prepared.plan, job, str(gone), wall), job.memory)
 
     def close(self) -> None:
-        """End the process for good: in peace, or at once while another thread waits for it."""
+        """End the process: by itself, or at once while another thread waits for it."""
         self.closed = True
         if self._busy.acquire(blocking=False):
             self._dismiss()
@@ -90,7 +90,7 @@ class Worker:
         self._group.discard(self)
 
     def _start(self, *, strict: bool) -> None:
-        """Start the process and wait until it can play; nothing to do if it runs.
+        """Start the process, unless it runs, and wait until it can play.
 
         Strict, an ego that cannot be started is a reason to refuse.
         """
@@ -107,12 +107,12 @@ class Worker:
                 if reply.state == "ready":
                     return
                 refusal = reply.reason
-                break  # it said no, and would again
+                break  # it refused, and would refuse again
         self._stop()
         raise InputError(refusal)
 
     def _ask(self, job: Job) -> Answer:
-        """Have a job played, by a new process if the old one is no more."""
+        """Play a job, by a new process if the old one has ended."""
         for _ in range(ATTEMPTS):
             try:
                 self._start(strict=False)
@@ -144,7 +144,7 @@ class Worker:
         self._pipe, theirs = Pipe()
         _limit(self._pipe)
         fds = theirs.fileno(), self._log.fileno()
-        # what a killed process leaves goes with this folder
+        # files that a killed process leaves are removed with this folder
         environment = inner_environment() | {"TMPDIR": self._folder.name}
         self._group.add(self)
         try:
@@ -163,7 +163,7 @@ class Worker:
     def _started(
         self, fds: tuple[int, int], environment: Mapping[str, str]
     ) -> subprocess.Popen[bytes]:
-        """The process, just started."""
+        """The started process."""
         return subprocess.Popen(
             [
                 sys.executable,
@@ -180,7 +180,7 @@ class Worker:
         )
 
     def _receive(self, deadline: float) -> Reply:
-        """What the process says, or _ProcessGone when it died or took too long."""
+        """The reply of the process, or _ProcessGone when it died or took too long."""
         try:
             if self._pipe.poll(deadline):
                 reply: Reply = self._pipe.recv()
@@ -192,7 +192,7 @@ class Worker:
         raise _ProcessGone(f"no answer within {deadline:g} s, killed")
 
     def _end(self) -> str:
-        """How the process ended, in words."""
+        """The end of the process, in words."""
         assert self._process is not None
         try:
             code = self._process.wait(5.0)
@@ -208,14 +208,14 @@ class Worker:
         return f" ({lines[-1]})" if lines else ""
 
     def _dismiss(self) -> None:
-        """Let a process that waits for a job end by itself, and so its ego."""
+        """Let a process that waits for a job, and its ego, end by themselves."""
         if self._process is not None:
             self._pipe.close()
             with contextlib.suppress(subprocess.TimeoutExpired):
                 self._process.wait(DISMISSAL_S)
 
     def _stop(self) -> None:
-        """End the process and what belongs to it."""
+        """End the process and its descendants."""
         if self._process is None:
             return
         _kill(self._process)
@@ -230,7 +230,7 @@ class _ProcessGone(Exception):
 
 
 def _limit(pipe: Connection) -> None:
-    """Let neither a send nor the rest of an answer wait for a stopped process for ever."""
+    """Set a time limit on sends and on the rest of an answer, for a stopped process."""
     with socket.socket(fileno=os.dup(pipe.fileno())) as end:
         for option in (socket.SO_RCVTIMEO, socket.SO_SNDTIMEO):
             end.setsockopt(socket.SOL_SOCKET, option, struct.pack("ll", STUCK_S, 0))
@@ -239,7 +239,7 @@ def _limit(pipe: Connection) -> None:
 def _kill(process: subprocess.Popen[bytes]) -> None:
     """Kill a process and its descendants, stopped ones too, and wait for its end.
 
-    Its descendants first: once it is gone they are those of somebody else.
+    Its descendants first: afterwards they have another parent.
     """
     if process.poll() is None:
         process.send_signal(signal.SIGSTOP)  # so that it starts no others
@@ -262,10 +262,10 @@ def join_group(group: set[Worker]) -> None:
 
 
 def play(prepared: PreparedBatch, jobs: Sequence[Job]) -> list[Answer]:
-    """Play jobs in a process of this thread's own: what every executor is given to do.
+    """Play jobs in a process of this thread; the function that every executor calls.
 
-    Several jobs share one simulation. What they find there is played again, each in a simulation
-    of its own, and that is what counts.
+    Several jobs share one simulation. Tests found there are played again, each in a simulation of
+    its own, which counts.
     """
     worker = _own_worker(prepared)
     if prepared.plan.reset == "fresh":
@@ -277,7 +277,7 @@ def play(prepared: PreparedBatch, jobs: Sequence[Job]) -> list[Answer]:
 
 
 def search(worker: Worker, jobs: Sequence[Job]) -> list[Answer]:
-    """Play jobs one after another in one simulation; behind an error, in a new one."""
+    """Play jobs one after another in one simulation; after an error, in a new one."""
     answers: list[Answer] = []
     for job in jobs:
         goes_on = bool(answers) and answers[-1].outcome.row["outcome"] != "error"

@@ -1,8 +1,8 @@
-"""The process that simulates: it plays jobs that come through a pipe until the pipe closes.
+"""A simulating process, the called side: it plays jobs from a pipe until the pipe closes.
 
-It must never outlive the process that started it. The end of the pipe tells it, between two jobs;
-Linux kills it together with its parent; and an alarm ends an episode that hangs inside SUMO, where
-neither Python nor the pipe is heard, on any system.
+It must never outlive the process that started it. Between two jobs it sees the end of the pipe;
+Linux kills it together with its parent; and on any system an alarm ends an episode that hangs
+inside SUMO, where Python does not run.
 """
 
 from __future__ import annotations
@@ -18,18 +18,18 @@ from cavsumo.batch.messages import Reply, Task
 from cavsumo.errors import CavsumoError
 from cavsumo.model.objects import take
 from cavsumo.model.offspring import adopt_orphans, kill_descendants
-from cavsumo.model.processes import leash
+from cavsumo.model.processes import end_with_parent
 
 if TYPE_CHECKING:
     from cavsumo.batch.episode_runner import EpisodeRunner
 
-IDLE_S = 60.0  # a process with nothing to do for so long goes
-ALARM_AFTER_S = 30.0  # how long after an episode's deadline the process ends itself
+IDLE_S = 60.0  # an idle process ends after this time
+ALARM_AFTER_S = 30.0  # time after an episode's deadline at which the process ends itself
 
 
 def main(pipe_fd: int, log_fd: int, parent: int) -> None:
-    """Make ready for what the first task names, say so, then play."""
-    leash(parent)()
+    """Prepare for the batch of the first task, reply, then play."""
+    end_with_parent(parent)()
     adopt_orphans()
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # the parent decides what Ctrl-C means
     signal.signal(signal.SIGALRM, signal.SIG_DFL)
@@ -38,8 +38,8 @@ def main(pipe_fd: int, log_fd: int, parent: int) -> None:
     with contextlib.suppress(EOFError, ConnectionError):  # the parent is gone or has no more jobs
         _serve(pipe, pipe.recv())
     sys.stderr.flush()
-    kill_descendants(os.getpid())  # daemons of the ego that hide where they come from
-    os._exit(0)  # taking Python and its libraries apart takes longer than an episode
+    kill_descendants(os.getpid())  # daemons of the ego that have left their process tree
+    os._exit(0)  # an orderly end of Python and its libraries takes longer than an episode
 
 
 def _serve(pipe: Connection, first: Task) -> None:
@@ -62,7 +62,7 @@ def _serve(pipe: Connection, first: Task) -> None:
 
 
 def _play(pipe: Connection, runner: EpisodeRunner, deadline: float) -> None:
-    """Play what is asked for until there is nothing to do for long.
+    """Play jobs until the process is idle for long.
 
     ``deadline``: of each simulation [s].
     """
@@ -85,7 +85,7 @@ def _play(pipe: Connection, runner: EpisodeRunner, deadline: float) -> None:
 
 
 def divert_output(log_fd: int) -> None:
-    """Send what SUMO prints to a file; what Python prints goes to the real stderr."""
+    """Send SUMO's output to a file; Python's output goes to the real stderr."""
     sys.stdout = sys.stderr = os.fdopen(os.dup(2), "w", buffering=1)
     os.dup2(log_fd, 1)
     os.dup2(log_fd, 2)

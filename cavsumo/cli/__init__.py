@@ -1,9 +1,10 @@
-"""The command line: reads words and calls what the other rooms offer; nothing is computed here.
+"""The command line: parses options and calls the other rooms, which do all computation.
 
-``command_line`` is the parser and the exit statuses, ``options`` the options of each command (light
-to import), ``commands`` what a command does (heavy, imported when it is called),
-``scenario_settings`` the options that are settings of a scenario.
-To add a command: its options in ``options/``, itself in ``commands/``, a line in ``command_line``.
+``command_line`` is the parser and the exit statuses, ``options`` the options of each command,
+``setting_options`` those that are read from the scenario record. ``requests`` are the records that
+commands take, with checks (light to import), ``commands`` the commands (heavy, imported when all
+checks have passed).
+To add a command: a file with ``add_NAME`` in ``options/``, a file in ``commands/``.
 """
 
 from cavsumo.cli.command_line import main

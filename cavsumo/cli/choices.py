@@ -1,4 +1,4 @@
-"""The names that options take, by the sort of things that have them; nothing heavy is imported."""
+"""The names that options accept, by registry, without heavy imports."""
 
 from __future__ import annotations
 

@@ -4,17 +4,12 @@ from __future__ import annotations
 
 import argparse
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
 from typing import Any, NoReturn
 
 from cavsumo import __version__
-from cavsumo.cli.options.certify import add_certify
-from cavsumo.cli.options.check_ego import add_check_ego
-from cavsumo.cli.options.game import add_game
-from cavsumo.cli.options.networks import add_import_osm, add_inspect
-from cavsumo.cli.options.results import add_merge, add_replay, add_report
-from cavsumo.cli.options.run import add_run
-from cavsumo.errors import BatchError, CavsumoError, DivergenceError, Exit, InputError
+from cavsumo.cli.options import adders
+from cavsumo.errors import BatchError, CavsumoError, DivergenceError, Exit, InputError, UnknownName
 
 HYPHENATED = ("--bbox", "--ego-route", "--junction")  # options whose values may begin with "-"
 
@@ -22,11 +17,14 @@ HYPHENATED = ("--bbox", "--ego-route", "--junction")  # options whose values may
 def main(argv: Sequence[str] | None = None) -> int:
     """The command ``cavsumo``; returns the exit status."""
     try:
-        words = sys.argv[1:] if argv is None else argv
+        words = _joined(sys.argv[1:] if argv is None else argv)
+        parser = _parser()
         if not words:
-            _parser().print_help()
+            parser.print_help()
             return Exit.USAGE
-        options = _parser().parse_args(_joined(words))
+        if words[0][:1] != "-" and words[0] not in parser.commands:
+            raise UnknownName("command", words[0], parser.commands)
+        options = parser.parse_args(words)
         status: int = options.command(options)
         return status
     except DivergenceError as error:
@@ -57,13 +55,15 @@ def _joined(words: Sequence[str]) -> list[str]:
 
 
 class _OptionParser(argparse.ArgumentParser):
-    """argparse with our way of saying no: one sentence, exit status 2.
+    """argparse with errors in one sentence and exit status 2.
 
     Attributes:
+        commands: the names of the commands, of the parser that has them.
         fill: adds the options of a command whose options are read from the scenario record, once
             that command is called; the help of all commands does without them.
     """
 
+    commands: Collection[str] = ()
     fill: Callable[[argparse.ArgumentParser], None] | None = None
 
     def parse_known_args(self, args: Any = None, namespace: Any = None) -> Any:
@@ -76,7 +76,7 @@ class _OptionParser(argparse.ArgumentParser):
         raise InputError(f"{message} (see {self.prog} --help)")
 
 
-def _parser() -> argparse.ArgumentParser:
+def _parser() -> _OptionParser:
     parser = _OptionParser(
         prog="cavsumo",
         description="Which tests make this vehicle fail at this junction, are they fair, and how "
@@ -85,15 +85,8 @@ def _parser() -> argparse.ArgumentParser:
     )
     parser.add_argument("--version", action="version", version=f"cavsumo {__version__}")
     commands = parser.add_subparsers(title="commands", required=True, metavar="COMMAND")
-    add_run(commands)
-    add_replay(commands)
-    add_report(commands)
-    add_merge(commands)
-    add_certify(commands)
-    add_check_ego(commands)
-    add_inspect(commands)
-    add_import_osm(commands)
-    add_game(commands)
+    for add in adders():
+        add(commands)
     for sort, text in (
         ("agents", "list the tester agents"),
         ("egos", "list the vehicles under test"),
@@ -102,6 +95,7 @@ def _parser() -> argparse.ArgumentParser:
         listing = commands.add_parser(sort, help=text, description=text, allow_abbrev=False)
         listing.add_argument("name", nargs="?", help="show the parameters of this one")
         listing.set_defaults(command=_list, sort=sort)
+    parser.commands = commands.choices
     return parser
 
 

@@ -1,4 +1,4 @@
-"""What there is to choose from: agents, egos, assertions."""
+"""Listings of agents, egos and assertions."""
 
 from __future__ import annotations
 
@@ -6,7 +6,17 @@ from collections.abc import Mapping
 from inspect import Parameter
 from typing import Any
 
+from cavsumo.agents.names import AGENT_NAMES, policy_file
+from cavsumo.assertions.names import ASSERTION_NAMES
+from cavsumo.egos.names import EGO_NAMES, EXTERNAL_NAMES
+from cavsumo.model.names import Names
 from cavsumo.model.registry import Registry
+
+NAMES: Mapping[str, Names] = {
+    "agents": AGENT_NAMES,
+    "egos": EGO_NAMES,
+    "assertions": ASSERTION_NAMES,
+}
 
 
 def registries() -> dict[str, Registry[Any]]:
@@ -20,6 +30,8 @@ def registries() -> dict[str, Registry[Any]]:
 
 def listing(sort: str, name: str | None) -> str:
     """One line for each entry, or one entry with its parameters, defaults and units."""
+    if name is not None and ":" not in name and not (sort == "egos" and name in EXTERNAL_NAMES):
+        NAMES[sort].check(name)
     registry = registries()[sort]
     if sort == "agents" and name is not None and name.startswith("policy:"):
         return _policy(name)
@@ -34,7 +46,7 @@ def listing(sort: str, name: str | None) -> str:
     shown = {
         f"{p.name}={p.default}": p.doc
         for p in registry.parameters(name)
-        if p.default is not Parameter.empty  # what stands behind the colon
+        if p.default is not Parameter.empty  # the part after the colon
     }
     return "\n".join(
         [f"{name}: {registry.summary(name)}", *(f"  {line}" for line in _columns(shown))]
@@ -42,13 +54,13 @@ def listing(sort: str, name: str | None) -> str:
 
 
 def _columns(lines: Mapping[str, str]) -> list[str]:
-    """Two columns, the first as wide as need be."""
+    """Two columns, the first as wide as needed."""
     width = max(map(len, lines), default=0)
     return [f"{first:{width}}  {second}" for first, second in lines.items()]
 
 
 def _forms(sort: str) -> Mapping[str, str]:
-    """How one from the user is named."""
+    """The forms of a user's name."""
     from cavsumo.assertions import specs as assertions
     from cavsumo.egos import specs as egos
 
@@ -65,15 +77,14 @@ def _with_own(assertion: str) -> Registry[Any]:
 
 
 def _registry_of(ego: str, registered: Registry[Any]) -> Registry[Any]:
-    """Where the parameters of an ego are found: exec and tcp have a registry of their own."""
+    """The registry of an ego's parameters: exec and tcp have their own."""
     from cavsumo.egos.external.ego import EXTERNAL
 
     return EXTERNAL if ego.partition(":")[0] in EXTERNAL else registered
 
 
 def _policy(spec: str) -> str:
-    """What a policy file says of itself."""
-    from cavsumo.agents.policy import policy_file
+    """The description of a policy file."""
     from cavsumo.agents.policy_file import read_policy
 
     file = policy_file(spec)

@@ -1,4 +1,4 @@
-"""The words of a command line as the settings of a scenario, or of several."""
+"""The options of a command line as the settings of one scenario or several."""
 
 from __future__ import annotations
 
@@ -9,20 +9,25 @@ from typing import Any
 from cavsumo.cli.setting_options import given
 from cavsumo.model.named_networks import DEFAULT
 from cavsumo.model.scenario.fields import settings
-from cavsumo.model.study import Part, read_study
+from cavsumo.model.study import Part, at_each, read_study
 
 
 def parts_of(options: argparse.Namespace) -> list[Part]:
-    """The batches of a run: the file's, overruled by the command line."""
+    """The batches of a run: those of the file, overridden by the command line."""
     found = settings_of(options)
     if options.config:  # which says where it plays
-        return read_study(Path(options.config), found)
-    return [Part("", found, {"net": DEFAULT})]
+        parts = read_study(Path(options.config), found)
+    else:
+        parts = [Part("", found, {"net": DEFAULT})]
+    nets = options.net or []
+    return at_each(parts, nets) if len(nets) > 1 else parts
 
 
 def settings_of(options: argparse.Namespace) -> dict[str, Any]:
-    """The settings that a command line gives."""
+    """The settings that a command line gives, with the first of several networks."""
     found = given(options, settings())
+    if "net" in found:
+        found["net"] = found["net"][0]
     if (formulas := found.get("formulas")) and (named := found.get("assertions")):
         # Who writes a formula on the command line means it.
         found["assertions"] = list(dict.fromkeys([*named, *formulas]))

@@ -15,7 +15,7 @@ from cavsumo.model.scenario.sensor import Sensor
 
 
 def add_setting(add: Callable[..., Any], setting: Setting, **instead: Any) -> None:
-    """Add the option of a setting to a command or a group; ``instead`` overrules its keywords."""
+    """Add the option of a setting to a command or a group; ``instead`` replaces its keywords."""
     add(
         *setting.names,
         **{"dest": setting.key, "help": help_of(setting), **_kind(setting)} | instead,
@@ -34,7 +34,7 @@ def given(options: argparse.Namespace, settings: Iterable[Setting]) -> dict[str,
 
 
 def help_of(setting: Setting) -> str:
-    """One line of meaning, how several are given, and the default."""
+    """One line with the meaning, the form of several values, and the default."""
     parts = [meaning(setting)]
     if _is_repeated(setting):
         parts.append("repeat for several")
@@ -55,7 +55,7 @@ def meaning(setting: Setting) -> str:
 
 
 def default_of(setting: Setting) -> str:
-    """The default in words, empty where nothing is to be said of it."""
+    """The default in words, empty for none."""
     default = setting.default
     if setting.option.unset or default is None or isinstance(default, bool):
         return setting.option.unset
@@ -72,7 +72,7 @@ def words_of(setting: Setting) -> tuple[str, ...]:
 
 
 def _kind(setting: Setting) -> dict[str, Any]:
-    """What argparse has to know of a setting's values."""
+    """The keywords of argparse for a setting's values."""
     if setting.type is bool:
         return {"action": argparse.BooleanOptionalAction, "default": None}
     words = ",".join(words_of(setting))

@@ -1,4 +1,4 @@
-"""What a command is doing, said on stderr once it has taken longer than a user likes to wait."""
+"""The current step of a command, printed on stderr if the command takes long."""
 
 from __future__ import annotations
 
@@ -10,10 +10,10 @@ AFTER_S = 2.0  # of silence
 
 
 class SlowSteps:
-    """Says which step is under way, from AFTER_S on; a context manager.
+    """Prints the current step, from AFTER_S on; a context manager.
 
     Args:
-        quiet: say nothing.
+        quiet: print nothing.
     """
 
     def __init__(self, *, quiet: bool = False) -> None:
@@ -32,13 +32,13 @@ class SlowSteps:
         self._timer.cancel()
 
     def begin(self, step: str) -> None:
-        """A step begins: what is done, such as "drawing"."""
+        """Begin a step, such as "drawing"."""
         self._step = step
         if not self._quiet and time.monotonic() - self._begun >= AFTER_S:
             self._say()
 
     def _say(self) -> None:
-        """Name the step under way, once."""
+        """Print the current step, once."""
         with self._lock:
             if self._step != self._said:
                 self._said = self._step

@@ -1,6 +1,6 @@
-"""The vehicle under test: the protocol (``base``), the registry, one file a sort of driver.
+"""The vehicle under test: the protocol (``base``), the registry, one file per kind of driver.
 
-``external`` speaks with egos in other processes, ``reference`` holds the drivers by which
+``external`` communicates with egos in other processes, ``reference`` holds the drivers by which
 violations are judged.
 To add one: a file here, its name in ``names``; it is imported when one is built. To add a
 reference driver: ``reference``.

@@ -1,4 +1,4 @@
-"""What an ego is: driven by SUMO, or a controller that answers each snapshot with a command."""
+"""The protocol of egos: driven by SUMO, or by a controller that answers each snapshot."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ Command = Acceleration | Drive | None
 
 @dataclasses.dataclass(frozen=True)
 class Mission:
-    """What an ego may know before its first episode: all that no episode changes.
+    """The data that an ego has before its first episode, constant over all episodes.
 
     Attributes:
         net: the network file.
@@ -45,7 +45,7 @@ class Mission:
         path: centre line of its route, from where its centre starts to where its front arrives.
         lights: the traffic lights on it.
         dt: length of a timestep [s].
-        horizon: how long an episode may last [s].
+        horizon: longest duration of an episode [s].
     """
 
     net: Path
@@ -57,12 +57,13 @@ class Mission:
 
 
 class Ego:
-    """Base of the egos; on its own it leaves the driving to SUMO.
+    """Base of the egos; SUMO drives this one.
 
     Attributes:
         kind: its box and limits.
-        depart_speed: speed on entering the network [m/s]; None for as fast as SUMO finds safe.
-        sees_background: whether it looks at the background traffic in the snapshots. See
+        depart_speed: speed on entering the network [m/s]; None for the largest that SUMO considers
+            safe.
+        sees_background: whether it uses the background traffic in the snapshots. See
             ``Agent.sees_background``.
     """
 
@@ -77,10 +78,10 @@ class Ego:
         return {"length": f"{self.kind.length}", "width": f"{self.kind.width}"}
 
     def prepare(self, mission: Mission) -> None:
-        """Get ready to drive, in the process that simulates; what it raises refuses the batch."""
+        """Get ready to drive, in the simulating process; an error here refuses the batch."""
 
     def close(self) -> None:
-        """End whatever ``prepare`` started."""
+        """End the processes and connections of ``prepare``."""
 
     def reset(self, scene: Scene) -> None:
         """Begin an episode."""
@@ -90,10 +91,10 @@ class Ego:
         return None
 
     def conclude(self) -> None:
-        """The episode is over: EgoError if its answers turn out to be those to other questions."""
+        """End the episode; EgoError if its answers belong to other observations."""
 
     def take_log(self) -> str:
-        """What it has printed since the last call, to be kept beside the episode's row."""
+        """Its output since the last call, to be kept beside the episode's row."""
         return ""
 
 

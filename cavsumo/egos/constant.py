@@ -1,4 +1,4 @@
-"""An ego that keeps its speed whatever happens, as in CAV-Gym's experiments."""
+"""An ego that always keeps its speed, as in CAV-Gym's experiments."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from cavsumo.model.snapshot import Snapshot
 
 @EGOS.register("constant")
 class ConstantEgo(Ego):
-    """Keeps its speed and its route and brakes for nobody (CAV-Gym's ego)."""
+    """Keeps its speed and its route and never brakes (CAV-Gym's ego)."""
 
     sees_background = False
 

@@ -1,4 +1,4 @@
-"""Egos from the user: a Python class named ``module:Class`` or an object, kept from doing harm.
+"""Egos from the user: a Python class ``module:Class`` or an object; errors end only the episode.
 
 The class is built with the ego's parameters as keywords. It has ``act(snapshot)``, which answers
 ``Acceleration`` or ``Drive``, and may have ``reset(scene)``, ``kind`` and ``depart_speed``. Of an
@@ -21,7 +21,7 @@ from cavsumo.model.snapshot import Snapshot
 
 
 class ControllerEgo(Ego):
-    """Wraps a user's controller: whatever it does wrong becomes an EgoError with the time."""
+    """Wraps a user's controller: each of its errors becomes an EgoError with the time."""
 
     def __init__(self, spec: str, factory: Callable[..., Any], params: Mapping[str, Any]) -> None:
         self.spec = spec

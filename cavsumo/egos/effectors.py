@@ -1,4 +1,4 @@
-"""What an ego's effectors can execute, for egos that somebody else wrote."""
+"""Checks that an ego's effectors can execute a command, for egos of users."""
 
 from __future__ import annotations
 
@@ -14,11 +14,11 @@ from cavsumo.model.bodies import Kind
 def checked(
     command: Any, before: type | None, kind: Kind, names: Sequence[str] | None = None
 ) -> Command:
-    """The command, if the ego's effectors can execute it; raises EgoError saying why not.
+    """The command, if the ego's effectors can execute it; otherwise EgoError with the reason.
 
     Args:
-        command: what the ego answered.
-        before: the sort of its earlier commands in this episode; None for the first.
+        command: the ego's answer.
+        before: the type of its earlier commands in this episode; None for the first.
         kind: of the ego's body.
         names: of the command's numbers, in messages; those of its fields if not given.
     """
@@ -34,7 +34,7 @@ def checked(
 
 
 def within(value: Any, low: float, high: float) -> bool:
-    """Whether a value is a finite number between two bounds, rounding forgiven."""
+    """Whether a value is a finite number between two bounds, up to rounding."""
     try:
         return math.isfinite(value) and low - 1e-9 <= value <= high + 1e-9
     except (TypeError, OverflowError):

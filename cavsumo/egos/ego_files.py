@@ -1,10 +1,10 @@
-"""The files that the command of an ego names: its program, what that reads, and what it writes.
+"""The files in the command of an ego: its program, its inputs and its outputs.
 
-A command does not say which of its files are read and which are written. The rule: a file that
-exists before the batch is an input, until it changes. The program itself, and the script that an
-interpreter is given, stay inputs whatever happens to them: with another one the ego is another. Any
-other file that appears or changes while egos run on this machine is written by them: an output,
-which is named in the manifest and no reason to refuse anything.
+A command does not tell which of its files are read and which are written. The rule: a file that
+exists before the batch is an input, until it changes. The program itself, and the script of an
+interpreter, always stay inputs: with another program the ego is another. Any other file that
+appears or changes while egos run on this machine counts as their output; it is named in the
+manifest and never a reason to refuse results.
 """
 
 from __future__ import annotations
@@ -24,12 +24,12 @@ _RUNNERS = re.compile(
     r"(python|pypy|node|nodejs|deno|bun|java|ruby|perl|lua|luajit|julia|Rscript|octave|php|bash|dash"
     r"|sh|zsh|ksh|fish|env|uv|conda|poetry|wine|mono|dotnet|nice|stdbuf|taskset|timeout)[\d.]*(\.exe)?"
 )
-_INLINE = frozenset({"-m", "-c", "-e"})  # options behind which no script is named
+_INLINE = frozenset({"-m", "-c", "-e"})  # options after which no script is named
 _BOOT = Path("/proc/sys/kernel/random/boot_id")
 
 
 class OutputWatch:
-    """Looks for files of an ego that appear or change; each is read again only when it was touched.
+    """Finds files of an ego that appear or change; each is read again only if it was touched.
 
     Args:
         spec: names the ego.
@@ -53,7 +53,7 @@ class OutputWatch:
 
 
 def data_files(spec: str) -> tuple[Path, ...]:
-    """The files that exist now of those that a command names behind its program."""
+    """The existing files among those that a command names after its program."""
     if spec.partition(":")[0] != "exec":
         return ()
     program = _program(spec)
@@ -61,7 +61,7 @@ def data_files(spec: str) -> tuple[Path, ...]:
 
 
 def _program(spec: str) -> frozenset[Path]:
-    """The files of a command that are the ego: its first word, and the script that it executes."""
+    """The files of a command that define the ego: its first word, and a script that it executes."""
     first, *others = command_words(spec.partition(":")[2])
     script = next((file for file in map(Path, others) if file.is_file()), None)
     elsewhere = not _RUNNERS.fullmatch(Path(first).name) or not _INLINE.isdisjoint(others)
@@ -69,7 +69,7 @@ def _program(spec: str) -> frozenset[Path]:
 
 
 def _touched(file: Path) -> tuple[int, ...]:
-    """What changes with a file; nothing for one that is gone meanwhile."""
+    """The status of a file that changes with it; nothing for a file that no longer exists."""
     try:
         stat = file.stat()
     except OSError:
@@ -78,7 +78,7 @@ def _touched(file: Path) -> tuple[int, ...]:
 
 
 def _checksum(file: Path) -> str | None:
-    """The SHA-256 of a file; None for one that is gone meanwhile."""
+    """The SHA-256 of a file; None for a file that no longer exists."""
     try:
         return checksum(file)
     except InputError:
@@ -86,7 +86,7 @@ def _checksum(file: Path) -> str | None:
 
 
 def machine() -> str:
-    """What tells this machine, since it was started, from others."""
+    """The identity of this machine since its start."""
     try:
         return _BOOT.read_text(encoding="ascii").strip()
     except OSError:

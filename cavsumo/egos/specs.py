@@ -1,4 +1,4 @@
-"""From the words that name an ego to the ego, and to the files that it is made of."""
+"""Egos by name: building them, and the files that define them."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from cavsumo.model.objects import Copies, is_object
 from cavsumo.model.plugins import source_file
 from cavsumo.model.registry import Registry
 
-# What an ego may be called besides a registered name, for listings.
+# Forms of an ego's name besides a registered name, for listings.
 FORMS: Mapping[str, str] = {
     "module:Class": "a Python class that answers each snapshot (README, docs/architecture.md)",
     "exec:COMMAND": "a program in any language, over its stdin and stdout (docs/ego-protocol.md)",
@@ -23,7 +23,7 @@ FORMS: Mapping[str, str] = {
 
 
 def make_ego(spec: str, params: Mapping[str, Any]) -> Ego:
-    """The registered ego of that name, one from outside, or the controller ``module:Class``."""
+    """The registered ego of that name, an external one, or the controller ``module:Class``."""
     sort, colon, _ = spec.partition(":")
     if not colon:
         return EGOS.make(spec, params)
@@ -36,7 +36,7 @@ def make_ego(spec: str, params: Mapping[str, Any]) -> Ego:
 
 
 def _alone(spec: str, factory: Callable[..., Ego]) -> Registry[Ego]:
-    """A registry of one ego, so that its messages name all of it."""
+    """A registry of one ego, so that its messages have the full name."""
     alone: Registry[Ego] = Registry("ego")
     alone.register(spec)(factory)
     return alone
@@ -49,7 +49,7 @@ def _leaves_driving_to_sumo(factory: Callable[..., Any]) -> bool:
 
 
 def ego_files(spec: str) -> tuple[Path, ...]:
-    """The files that make an ego what it is: those that a command names, or the class's module."""
+    """The files that define an ego: those that a command names, or the class's module."""
     sort, colon, address = spec.partition(":")
     if not colon or sort == "tcp":
         return ()

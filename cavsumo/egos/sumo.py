@@ -42,8 +42,8 @@ VTYPE_ATTRIBUTES = frozenset(
 class SumoEgo(Ego):
     """Driven by SUMO; by default its Krauss driver with a reaction time (actionStepLength 1.0).
 
-    SUMO's plain driver reacts within one timestep and brakes with exactly the deceleration that
-    the stopping zones assume; ``actionStepLength=0`` gives it back.
+    SUMO's own default driver reacts within one timestep and brakes with exactly the deceleration
+    that the stopping zones assume; ``actionStepLength=0`` selects it.
     """
 
     sees_background = False

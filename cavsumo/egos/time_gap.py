@@ -5,7 +5,7 @@ The Intelligent Driver Model (Treiber, Hennecke, Helbing, Phys. Rev. E 62, 2000,
     a = a_max (1 - (v / v0)^4 - (s* / s)^2),   s* = s0 + v T + v dv / (2 sqrt(a_max b))
 
 applied to the nearest body whose box reaches into the strip that the ego will sweep along its
-path. It knows neither traffic lights nor rights of way.
+path. It ignores traffic lights and rights of way.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ SIGHT_M = 80.0
 
 @EGOS.register("time-gap")
 class TimeGapEgo(Ego):
-    """Keeps a time gap to whatever is in its path and brakes for it (IDM), blind to signals."""
+    """Keeps a time gap to bodies in its path and brakes for them (IDM), but ignores signals."""
 
     PARAMETERS: ClassVar[Mapping[str, str]] = {
         "speed": "desired speed v0 [m/s]",

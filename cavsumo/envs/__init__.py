@@ -1,4 +1,4 @@
-"""Gymnasium and PettingZoo views of the simulator, for learners.
+"""Gymnasium and PettingZoo environments for learning testers and egos.
 
 Importing this package registers ``cavsumo/Tester-v0`` and ``cavsumo/Ego-v0`` with Gymnasium; so
 does naming them with it, ``gymnasium.make("cavsumo.envs:cavsumo/Tester-v0", net=...)``.
@@ -20,14 +20,14 @@ __all__ = ["ENVIRONMENTS", "parallel_env"]
 
 
 def parallel_env(**settings: Any) -> CavsumoParallelEnv:
-    """A PettingZoo environment in which testers and ego move at once (``CavsumoParallelEnv``)."""
+    """A PettingZoo environment in which testers and ego act at once (``CavsumoParallelEnv``)."""
     from cavsumo.envs.parallel import CavsumoParallelEnv
 
     return CavsumoParallelEnv(**settings)
 
 
 def _register() -> None:
-    """File the environments with Gymnasium, which loads their classes when they are made."""
+    """Register the environments with Gymnasium, which loads their classes when they are made."""
     import gymnasium
 
     for name, entry in ENVIRONMENTS.items():

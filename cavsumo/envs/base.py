@@ -1,4 +1,4 @@
-"""What the two Gymnasium environments share: one learner, everybody else as the scenario says."""
+"""The common part of both Gymnasium environments: one learner, all others by the scenario."""
 
 from __future__ import annotations
 
@@ -11,8 +11,8 @@ from gymnasium.error import ResetNeeded
 from numpy.typing import NDArray
 
 from cavsumo.batch.prepared import PreparedBatch
-from cavsumo.envs.elsewhere import Elsewhere
 from cavsumo.envs.episodes import Episodes, Seen
+from cavsumo.envs.remote import RemoteEpisodes
 from cavsumo.envs.settings import PROCESSES, Roles
 from cavsumo.envs.spaces import ActionSpace, Vector, numbers
 from cavsumo.errors import InputError
@@ -22,14 +22,14 @@ RENDER_MODES = ("rgb_array",)
 
 
 class RunningScenario:
-    """A prepared batch whose scenario is played, here or elsewhere, and its pictures."""
+    """A prepared batch whose scenario is played, in this process or another, and its pictures."""
 
     def __init__(self, prepared: PreparedBatch, roles: Roles, process: str) -> None:
         try:
             choice("process", process, PROCESSES)
         except ValueError as error:
             raise InputError(f"{roles.named}: {error}") from error
-        self.episodes = (Episodes if process == "this" else Elsewhere)(prepared, roles)
+        self.episodes = (Episodes if process == "this" else RemoteEpisodes)(prepared, roles)
         scenario = prepared.plan.scenario
         self.fps = max(1, round(1.0 / (scenario.step_length * roles.hold)))
         self._painter: Any = None
@@ -39,13 +39,13 @@ class RunningScenario:
             self._painter = Painter(prepared)
 
     def picture(self) -> NDArray[np.uint8]:
-        """What there is to be seen now."""
+        """The picture of the present state."""
         picture: NDArray[np.uint8] = self._painter.paint(self.episodes.snapshot())
         return picture
 
 
 class OneLearner(gymnasium.Env[Any, Any]):
-    """A Gymnasium environment in which one role is moved from outside.
+    """A Gymnasium environment in which the caller controls one role.
 
     Attributes:
         prepared: the scenario, checked, and its site.
@@ -89,7 +89,7 @@ class OneLearner(gymnasium.Env[Any, Any]):
         return seen.observations[self._learner], seen.info
 
     def step(self, action: Any) -> tuple[Vector, float, bool, bool, dict[str, Any]]:
-        """Move on; an action outside its box is clamped to it, what is none is refused."""
+        """Move on; an action outside its box is clamped to it, an invalid one is refused."""
         if not self._under_way:
             raise ResetNeeded(f"{self._learner}: the episode is over or has not begun; reset first")
         values = numbers(action, self.action_space, self._learner)
@@ -117,6 +117,6 @@ class OneLearner(gymnasium.Env[Any, Any]):
 
 
 def check_render_mode(mode: str | None, who: str) -> None:
-    """Raise InputError for a way of rendering that there is not."""
+    """Raise InputError for an unknown render mode."""
     if mode is not None and mode not in RENDER_MODES:
         raise InputError(f"{who}: render_mode must be rgb_array or None, got {mode!r}")

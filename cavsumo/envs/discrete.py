@@ -1,4 +1,4 @@
-"""A wrapper for learners that choose from a list, such as tabular ones."""
+"""A wrapper for learners that choose from a list of actions, such as tabular ones."""
 
 from __future__ import annotations
 

@@ -6,15 +6,15 @@ from pathlib import Path
 from typing import Any
 
 from cavsumo.envs.base import OneLearner
+from cavsumo.envs.commanded import CommandedEgo
 from cavsumo.envs.ego_observations import entries
 from cavsumo.envs.episodes import EGO
-from cavsumo.envs.puppets import PuppetEgo
 from cavsumo.envs.settings import Roles, prepared_for
 from cavsumo.envs.spaces import normalised, observation_space
 
 
 class EgoEnv(OneLearner):
-    """The learner drives the ego along its route and should cope with the tests it meets.
+    """The learner drives the ego along its route and should pass the tests it meets.
 
     Observation, action, reward and info are described in docs/environments.md. The other keywords
     are the settings of a scenario file.
@@ -24,7 +24,7 @@ class EgoEnv(OneLearner):
         control: "acceleration" (SUMO keeps the ego on its route) or "drive" (throttle and
             steering, by the kinematics).
         max_speed: the ego drives no faster [m/s].
-        depart_speed: its first speed [m/s]; None for as fast as SUMO finds safe.
+        depart_speed: its first speed [m/s]; None for the largest that SUMO considers safe.
         config, hold, process, render_mode: as for ``TesterEnv``.
 
     Raises InputError when a setting is wrong.
@@ -54,6 +54,6 @@ class EgoEnv(OneLearner):
         )
         prepared = prepared_for(roles, config, settings, one_team=False)
         super().__init__(prepared, roles, learner=EGO, process=process, render_mode=render_mode)
-        ego = PuppetEgo(**driver)  # type: ignore[arg-type]
+        ego = CommandedEgo(**driver)  # type: ignore[arg-type]
         self.action_space = normalised(2 if ego.steers else 1)
         self.observation_space = observation_space(entries(ego.kind))

@@ -1,11 +1,11 @@
-"""What a learning ego is shown: one flat vector of numbers, in its own frame.
+"""The observation of a learning ego: one flat vector of numbers, in its own frame.
 
 ============================ ====== ============================================================
 entry                        unit   meaning
 ============================ ====== ============================================================
 ``ego.speed_mps``            m/s    its speed
 ``ego.steering_rad``         rad    its steering angle, positive to the left
-``ego.left_m``               m      what is left of its path, from its front
+``ego.left_m``               m      length of its path ahead of its front
 ``ego.beside_m``             m      how far its centre is beside the path, positive to the left
 ``ego.turned_rad``           rad    its heading relative to the path, positive to the left
 ``pathD.y_m``                m      how far to its left the path lies D metres on (5, 10, 20, 40)
@@ -20,7 +20,8 @@ entry                        unit   meaning
 ============================ ====== ============================================================
 
 Bodies are testers and background traffic alike, six of them, the nearest first. Every entry is
-clipped into its bounds. What is not there is 0, but for the distance of a light: its upper bound.
+clipped to its bounds. Entries of missing bodies and lights are 0, except the distance of a light,
+which is its upper bound.
 """
 
 from __future__ import annotations
@@ -38,7 +39,7 @@ from cavsumo.model.scene import Scene
 from cavsumo.model.snapshot import RawState, Snapshot
 
 VERSION = 1  # changes with the meaning of any entry
-AHEAD_M = (5.0, 10.0, 20.0, 40.0)  # where the path ahead is looked at
+AHEAD_M = (5.0, 10.0, 20.0, 40.0)  # distances of the points of the path ahead
 BODIES = 6
 FAR_M, BESIDE_M, SIGHT_M, BODY_SPEED = 100.0, 20.0, 80.0, 30.0  # bounds of the entries
 LENGTH_M, WIDTH_M = 20.0, 5.0
@@ -73,7 +74,7 @@ def entries(kind: Kind) -> tuple[Bounds, ...]:
 
 
 class EgoObserver:
-    """Shows the snapshots of one episode to the ego; made anew at each reset."""
+    """The observations of one episode for the ego; made anew at each reset."""
 
     def __init__(self, scene: Scene) -> None:
         self._scene = scene
@@ -81,7 +82,7 @@ class EgoObserver:
         self._half = scene.ego.kind.length / 2
 
     def vector(self, snapshot: Snapshot) -> NDArray[np.float32]:
-        """What the ego is shown of a snapshot: float32 of shape (number of entries,)."""
+        """The ego's observation of a snapshot: float32 of shape (number of entries,)."""
         bounded = [
             low if value < low else high if value > high else value
             for value, (low, high) in zip(self._values(snapshot), self._bounds, strict=True)

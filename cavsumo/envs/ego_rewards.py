@@ -1,4 +1,4 @@
-"""What an ego that learns to drive earns: ground along its path, less what it should not do.
+"""The reward of a learning ego: progress along its path, less costs.
 
 In one timestep of dt seconds, with p metres of progress along the path and acceleration a::
 
@@ -23,15 +23,15 @@ VIOLATION = 100.0
 OFF_ROAD = 100.0
 
 
-class EgoLedger:
-    """The account of one episode.
+class EgoRewardMonitor:
+    """The rewards of one episode.
 
     Attributes:
         off_road: whether the ego's centre has left the carriageway.
     """
 
     def __init__(self, scene: Scene, snapshot: Snapshot, *, steers: bool) -> None:
-        """``steers``: the ego may leave the carriageway, for it steers itself."""
+        """``steers``: the ego steers itself, so it may leave the carriageway."""
         self._scene, self._steers, self._before = scene, steers, snapshot
         self._along = scene.ego_progress(snapshot)
         self._violated = self.off_road = False

@@ -1,6 +1,6 @@
-"""Episodes of one scenario played step by step, some roles moved from outside.
+"""Episodes of one scenario played step by step, with some roles controlled by the caller.
 
-This is the part of an environment that has SUMO; it may live in another process (``elsewhere``).
+This is the part of an environment that has SUMO; it may live in another process (``remote``).
 """
 
 from __future__ import annotations
@@ -12,10 +12,10 @@ from typing import Any, NamedTuple
 
 from cavsumo.agents.observations import TeamObserver
 from cavsumo.batch.prepared import PreparedBatch
+from cavsumo.envs.commanded import CommandedAgent, CommandedEgo
 from cavsumo.envs.ego_observations import EgoObserver
-from cavsumo.envs.ego_rewards import EgoLedger
+from cavsumo.envs.ego_rewards import EgoRewardMonitor
 from cavsumo.envs.events import EventDetector
-from cavsumo.envs.puppets import PuppetAgent, PuppetEgo
 from cavsumo.envs.settings import Roles
 from cavsumo.envs.spaces import Vector
 from cavsumo.errors import SimulationError, SimulationTaken
@@ -28,7 +28,7 @@ EGO = "ego"
 
 
 class Seen(NamedTuple):
-    """What those who move something get back.
+    """The result of a step for the roles that the caller controls.
 
     Attributes:
         observations, rewards: by role: "ego", and the names of the teams (``team_name``).
@@ -45,7 +45,7 @@ class Seen(NamedTuple):
 
 
 def team_name(bodies: Sequence[Body], team: Sequence[int]) -> str:
-    """What a team is called: as its body, or as its first and last."""
+    """The name of a team: that of its body, or those of its first and last."""
     first, last = bodies[team[0]].id, bodies[team[-1]].id
     return first if first == last else f"{first}-{last.removeprefix('tester')}"
 
@@ -67,9 +67,9 @@ class Episodes:
         setup = self._setup
         loop = EpisodeLoop(setup, self._agents, seed)
         scene = loop.scene
-        self._observers = [TeamObserver(scene, team) for team in setup.teams if self._puppets]
+        self._observers = [TeamObserver(scene, team) for team in setup.teams if self._commanded]
         self._ego_observer = EgoObserver(scene)
-        self._rewards = EgoLedger(scene, loop.snapshot, steers=self._steers)
+        self._rewards = EgoRewardMonitor(scene, loop.snapshot, steers=self._steers)
         self._watch = EventDetector(loop, setup.assertions)
         self._loop, self._game_over, self._left = loop, False, False
         info = self._watch.info() | {"seed": seed}
@@ -88,7 +88,7 @@ class Episodes:
         rewards = dict.fromkeys(self._names, 0.0)
         ended = self._ended()
         for _ in range(self._roles.hold):
-            if any(ended):  # it was decided before anybody moved
+            if any(ended):  # it was decided before the first action
                 break
             self._advance(loop, rewards)
             ended = self._ended()
@@ -99,11 +99,11 @@ class Episodes:
         return Seen(self._observations(), rewards, *ended, info)
 
     def snapshot(self) -> Snapshot:
-        """What there is to be seen now."""
+        """The snapshot of the present state."""
         return self._watch.loop.snapshot
 
     def close(self) -> None:
-        """End SUMO and whatever the ego started."""
+        """End SUMO and the ego's processes and connections."""
         self._loop = None
         if self._setup is not None:
             self._end()
@@ -113,31 +113,31 @@ class Episodes:
         """Set up the scenario, without starting SUMO, and build the agents and the ego."""
         prepared, roles = self._prepared, self._roles
         ego = roles.make_ego(prepared)
-        self._puppet_ego = ego if isinstance(ego, PuppetEgo) else None
-        self._steers = self._puppet_ego is not None and self._puppet_ego.steers
+        self._commanded_ego = ego if isinstance(ego, CommandedEgo) else None
+        self._steers = self._commanded_ego is not None and self._commanded_ego.steers
         setup = make_setup(prepared.plan.scenario, prepared.site, ego)
-        self._puppets: list[PuppetAgent] = []
+        self._commanded: list[CommandedAgent] = []
         if roles.agent is None:
-            self._puppets = [
-                PuppetAgent(roles.actions, sees_background=roles.drawn) for _ in setup.teams
+            self._commanded = [
+                CommandedAgent(roles.actions, sees_background=roles.drawn) for _ in setup.teams
             ]
-        self._agents = self._puppets or prepared.cast.agents(roles.agent or "")
-        teams = [team_name(setup.bodies, team) for team in setup.teams if self._puppets]
+        self._agents = self._commanded or prepared.cast.agents(roles.agent or "")
+        teams = [team_name(setup.bodies, team) for team in setup.teams if self._commanded]
         self._teams = tuple(teams)
-        self._names = (*teams, EGO) if self._puppet_ego else self._teams
+        self._names = (*teams, EGO) if self._commanded_ego else self._teams
         self._end = weakref.finalize(self, _end, setup, os.getpid())  # if nobody calls close
         ego.prepare(setup.mission)
         self._setup = setup
 
     def _tell(self, actions: Mapping[str, Sequence[float]]) -> None:
-        """Tell the puppets what to do."""
-        for name, puppet in zip(self._teams, self._puppets, strict=True):
-            puppet.told = actions[name]
-        if self._puppet_ego is not None:
-            self._puppet_ego.told = actions[EGO]
+        """Set the actions of the agents and of the ego."""
+        for name, commanded in zip(self._teams, self._commanded, strict=True):
+            commanded.told = actions[name]
+        if self._commanded_ego is not None:
+            self._commanded_ego.told = actions[EGO]
 
     def _advance(self, loop: EpisodeLoop, rewards: dict[str, float]) -> None:
-        """One timestep, and what everybody earned in it."""
+        """One timestep, and the rewards of all roles in it."""
         assert self._setup is not None
         before = loop.snapshot
         try:
@@ -152,7 +152,7 @@ class Episodes:
             self._game_over = feedback[1]
             for name, reward in zip(self._teams, feedback[0], strict=False):
                 rewards[name] += reward
-        if self._puppet_ego is not None:
+        if self._commanded_ego is not None:
             successor = None if self._left else loop.snapshot
             judgements = [a.judgement for a in self._setup.assertions]
             rewards[EGO] += self._rewards.reward(successor, judgements)
@@ -170,14 +170,14 @@ class Episodes:
         return decided, not decided
 
     def _observations(self) -> dict[str, Vector]:
-        """What each role is shown now."""
+        """The observation of each role."""
         loop = self._watch.loop
         views = loop.agent_views if self._observers else ()
         seen = {
             name: observer.vector(view)
             for name, observer, view in zip(self._teams, self._observers, views, strict=True)
         }
-        if self._puppet_ego is not None:
+        if self._commanded_ego is not None:
             seen[EGO] = self._ego_observer.vector(loop.ego_view)
         return seen
 

@@ -1,4 +1,4 @@
-"""What happened in a step besides the reward: events, and a summary at the end."""
+"""The information of a step besides the reward: events, and a summary at the end."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ KEYS = {
 
 
 class EventDetector:
-    """Follows one episode and says what is new."""
+    """Follows one episode and reports new events."""
 
     def __init__(self, loop: EpisodeLoop, assertions: Sequence[Assertion]) -> None:
         self.loop, self._assertions = loop, assertions
@@ -37,7 +37,7 @@ class EventDetector:
         return {"time_s": time, "outcome": outcome, "events": events}
 
     def summary(self) -> dict[str, Any]:
-        """The figures of the episode, as far as it went."""
+        """The figures of the episode so far."""
         figures = measured(self.loop.finished())
         return figures | {"decided": not any(a.pending for a in self._assertions)}
 

@@ -1,4 +1,4 @@
-"""A snapshot as a picture from above, with Pillow: the place, the ego's zones, everybody.
+"""A snapshot as a picture from above, with Pillow: the place, the ego's zones, all bodies.
 
 The picture follows the ego. It is drawn twice as large and then reduced, for smooth edges.
 """
@@ -35,7 +35,7 @@ FINER = 2  # drawn so many times larger
 AHEAD_M = 16.0  # the middle of the picture is so far ahead of the ego
 LINES_M = {"borders": 0.14, "solid": 0.12, "dashed": 0.12, "route": 0.2}  # widths
 DASHES_M = {"borders": 0.4, "dashed": 3.0, "route": 2.0}  # lengths of a dash, and of a gap
-HEAD_M = 0.3  # radius of who walks, seen from above
+HEAD_M = 0.3  # radius of a pedestrian, seen from above
 
 EGO, TESTER, CAR, PERSON = "#1f5fa8", "#d6402b", "#f0f0ec", "#6a51a3"
 BRAKING, REACTION = (214, 64, 43, 150), (245, 179, 1, 150)
@@ -119,7 +119,7 @@ class _Canvas:
         self._pen.line(self._pixels(points), fill=colour, width=max(1, round(width * self._scale)))
 
     def tint(self, points: Points, colour: tuple[int, int, int, int]) -> None:
-        """Fill one polygon with a colour that lets what is below through."""
+        """Fill one polygon with a transparent colour."""
         if len(points) > 2:
             self._pen.polygon(self._pixels(points), fill=colour)
 
@@ -155,7 +155,7 @@ def _middle(ego: BodyState) -> tuple[float, float]:
 
 
 def _draw(canvas: _Canvas, state: BodyState, colour: str) -> None:
-    """A body's box, for vehicles with a windscreen; who walks has a nose."""
+    """Draw a body: a box, with a windscreen for vehicles, a circle with a nose for pedestrians."""
     canvas.body(corners(state.box), colour)
     kind, ahead = state.body.kind, (math.cos(state.o), math.sin(state.o))
     if kind.name in WALKING:

@@ -1,4 +1,4 @@
-"""Testers and ego as PettingZoo agents that move at the same time, as in the seed's game."""
+"""Testers and ego as PettingZoo agents that act at the same time, as in the seed's game."""
 
 from __future__ import annotations
 
@@ -17,8 +17,8 @@ from cavsumo.agents import observations
 from cavsumo.agents.casting import teams, tester_bodies
 from cavsumo.envs import ego_observations
 from cavsumo.envs.base import RENDER_MODES, RunningScenario, check_render_mode
+from cavsumo.envs.commanded import CommandedEgo
 from cavsumo.envs.episodes import EGO, Seen, team_name
-from cavsumo.envs.puppets import PuppetEgo
 from cavsumo.envs.settings import Roles, prepared_for
 from cavsumo.envs.spaces import (
     ActionSpace,
@@ -43,10 +43,10 @@ class CavsumoParallelEnv(ParallelEnv[str, Vector, Any]):  # type: ignore[misc]
     docs/environments.md. The other keywords are the settings of a scenario file.
 
     Args:
-        zero_sum: the ego loses what the testers win, as in the seed's game; else it earns what it
-            earns in cavsumo/Ego-v0.
-        until: "game" or "verdict" as for ``TesterEnv``; by default "game" if it is zero-sum, for
-            nothing is won after that, else "verdict".
+        zero_sum: the ego's reward is the negative of the testers', as in the seed's game; else it
+            is that of cavsumo/Ego-v0.
+        until: "game" or "verdict" as for ``TesterEnv``; by default "game" if it is zero-sum,
+            because there is no reward after that, else "verdict".
         process: "own", or "this" for a faster simulation in this process, which has only one.
         control, max_speed, depart_speed: as for ``EgoEnv``.
         config, actions, hold, render_mode: as for ``TesterEnv``.
@@ -91,13 +91,13 @@ class CavsumoParallelEnv(ParallelEnv[str, Vector, Any]):  # type: ignore[misc]
         self.render_mode, self._zero_sum = render_mode, zero_sum
         self._play = RunningScenario(self.prepared, roles, process)
         self.metadata = {**type(self).metadata, "render_fps": self._play.fps}  # type: ignore[misc]
-        self._spaces = self._made_spaces(PuppetEgo(**driver), actions)  # type: ignore[arg-type]
+        self._spaces = self._made_spaces(CommandedEgo(**driver), actions)  # type: ignore[arg-type]
         self.possible_agents = list(self._spaces)
         self.agents: list[str] = []
         self._np_random: np.random.Generator | None = None
 
     def _made_spaces(
-        self, ego: PuppetEgo, actions: str
+        self, ego: CommandedEgo, actions: str
     ) -> dict[str, tuple[spaces.Box, ActionSpace]]:
         """The spaces of observations and actions of each agent."""
         scenario = self.prepared.plan.scenario
@@ -113,11 +113,11 @@ class CavsumoParallelEnv(ParallelEnv[str, Vector, Any]):  # type: ignore[misc]
         return made
 
     def observation_space(self, agent: str) -> spaces.Box:
-        """What an agent is shown."""
+        """The observation space of an agent."""
         return self._spaces[agent][0]
 
     def action_space(self, agent: str) -> ActionSpace:
-        """What an agent can do."""
+        """The action space of an agent."""
         return self._spaces[agent][1]
 
     def reset(
@@ -142,7 +142,7 @@ class CavsumoParallelEnv(ParallelEnv[str, Vector, Any]):  # type: ignore[misc]
         dict[str, bool],
         dict[str, dict[str, Any]],
     ]:
-        """Everybody moves at once; actions as in ``OneLearner.step``, one for each agent."""
+        """All agents act at once; actions as in ``OneLearner.step``, one for each agent."""
         if not self.agents:
             raise ResetNeeded("the episode is over or has not begun; reset first")
         for name in self.agents:

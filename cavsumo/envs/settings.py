@@ -1,4 +1,4 @@
-"""From the keywords of an environment to a scenario that was checked, with its site."""
+"""The checked scenario of an environment, with its site, from the environment's keywords."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from typing import Any
 from cavsumo.batch.prepared import PreparedBatch, prepare
 from cavsumo.egos import make_ego
 from cavsumo.egos.base import Ego
-from cavsumo.envs.puppets import ACTIONS, PuppetEgo
+from cavsumo.envs.commanded import ACTIONS, CommandedEgo
 from cavsumo.errors import InputError, UnknownName
 from cavsumo.model.bodies import WALKING
 from cavsumo.model.checks import choice, whole
@@ -25,15 +25,15 @@ KEYS = frozenset(s.key for s in offered() if s.environments)  # keywords of the 
 
 @dataclass(frozen=True)
 class Roles:
-    """Who is moved from outside, and how.
+    """The roles that the caller controls.
 
     Attributes:
-        agent: the registered agent that plays the testers; None when they are moved from outside.
-        ego: keywords of the ``PuppetEgo``; None when the scenario's ego drives.
+        agent: the registered agent that plays the testers; None when the caller controls them.
+        ego: keywords of the ``CommandedEgo``; None when the scenario's ego drives.
         until: "game": an episode ends when the tester's game does, at its goal or in a dead end;
             "verdict": when the assertions have decided, as in ``cavsumo run``.
         hold: for how many timesteps an action lasts.
-        actions: what an action of the testers is: "effectors" or "targets".
+        actions: form of the testers' actions: "effectors" or "targets".
         drawn: whether pictures are made, for which the whole background is read.
     """
 
@@ -43,7 +43,7 @@ class Roles:
     hold: int = 1
     actions: str = "effectors"
     drawn: bool = False
-    named: str = field(default="cavsumo", compare=False)  # the environment, for what it refuses
+    named: str = field(default="cavsumo", compare=False)  # the name of the environment in messages
 
     def __post_init__(self) -> None:
         try:
@@ -54,9 +54,9 @@ class Roles:
             raise InputError(f"{self.named}: {error}") from error
 
     def make_ego(self, prepared: PreparedBatch) -> Ego:
-        """The ego that drives."""
+        """The ego of the environment."""
         if self.ego is not None:
-            return PuppetEgo(**self.ego)
+            return CommandedEgo(**self.ego)
         scenario = prepared.plan.scenario
         return make_ego(scenario.ego, scenario.ego_params)
 
@@ -64,11 +64,11 @@ class Roles:
 def prepared_for(
     roles: Roles, config: str | Path | None, given: Mapping[str, Any], *, one_team: bool
 ) -> PreparedBatch:
-    """What an environment plays, checked; raises InputError in one sentence.
+    """The prepared scenario of an environment; raises InputError in one sentence.
 
     Args:
         config: a scenario file, whose batch settings are left aside.
-        given: settings by the names of a scenario file; they win over the file's.
+        given: settings by the names of a scenario file; they take precedence over the file's.
         one_team: one agent owns all testers.
     """
     source = roles.named
@@ -86,7 +86,7 @@ def prepared_for(
     plan = plan_from(settings | {"agents": (roles.agent or "noop",)}, source)
     if roles.actions == "targets" and plan.scenario.kind not in WALKING:
         raise InputError(f"{source}: actions 'targets' are for {' and '.join(WALKING)}s only")
-    prepared = prepare(plan, PuppetEgo(**roles.ego) if roles.ego is not None else None)
+    prepared = prepare(plan, CommandedEgo(**roles.ego) if roles.ego is not None else None)
     if prepared.cast.learners:
         raise InputError(
             f"{source}: agent {roles.agent} learns from episode to episode, so a seed would not "
@@ -98,18 +98,18 @@ def prepared_for(
 def _refuse_what_is_learned(
     roles: Roles, given: Mapping[str, Any], settings: dict[str, Any]
 ) -> None:
-    """Refuse settings of whom the learner replaces; a scenario file may have them."""
+    """Refuse settings of the role that the learner replaces; a scenario file may have them."""
     replaced = ["ego", "ego_params"] if roles.ego is not None else []
     replaced += ["params"] if roles.agent is None else []
     for key in replaced:
         if given.get(key):
             who = "ego is" if key.startswith("ego") else "testers are"
-            raise InputError(f"{roles.named}: {key}: the {who} moved by whoever steps this")
+            raise InputError(f"{roles.named}: {key}: the {who} moved by the caller of step")
         settings.pop(key, None)
 
 
 def _own_all(settings: dict[str, Any], source: str) -> None:
-    """One agent for all testers, unless that is not what was asked for."""
+    """One agent for all testers; refuse another number of bodies per agent."""
     testers = settings.get("testers", 3)
     if settings.setdefault("bodies_per_agent", testers) != testers:
         raise InputError(

@@ -1,8 +1,8 @@
 """Spaces of actions and observations, and actions as plain numbers.
 
-"effectors": for each effector a number in [-1, 1], from its lower to its upper limit, as learners
-like it; what lies outside is clamped. "targets": for each body one of ``agents.features.TARGETS``.
-What is not of that form, or not finite, is refused.
+"effectors": for each effector a number in [-1, 1], from its lower to its upper limit; values
+outside are clamped. "targets": for each body one of ``agents.features.TARGETS``. An action of
+another form, or not finite, is refused.
 """
 
 from __future__ import annotations
@@ -42,7 +42,7 @@ def observation_space(entries: Sequence[tuple[str, float, float]]) -> spaces.Box
 
 
 def numbers(values: Any, space: ActionSpace, who: str) -> list[float]:
-    """An action as plain floats within its space; raises AgentError for what is none."""
+    """An action as plain floats within its space; raises AgentError for an invalid one."""
     size = space.shape[0]
     try:
         found = np.asarray(values, dtype=np.float64).reshape(-1).tolist()

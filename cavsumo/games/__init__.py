@@ -1,4 +1,4 @@
-"""Two-player stochastic shortest path games, solved with certificates; nothing of traffic."""
+"""Two-player stochastic shortest path games, solved with certificates; independent of traffic."""
 
 from cavsumo.games.build import from_arrays, from_callable, from_transitions
 from cavsumo.games.certificate import Certificate, holds, holds_exactly

@@ -1,7 +1,7 @@
-"""How much a cell raises a value: r(c) + sum over s' of T(c, s') V(s') - V(s).
+"""The advantage of a cell: r(c) + sum over s' of T(c, s') V(s') - V(s).
 
-Computed as r + sum of p (V(s') - V(s)): rounding errors are then as small as the differences of
-values and not as large as values, which bounds that are close together depend on.
+Computed as r + sum of p (V(s') - V(s)): rounding errors are then in proportion to the differences
+of values, not to the values, as bounds that are close together require.
 """
 
 from __future__ import annotations

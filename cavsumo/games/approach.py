@@ -1,18 +1,20 @@
-"""Approaching the fixed point of T V + shift: by jumps, and by policies held where these stick.
+"""Approaching the fixed point of T V + shift by jumps and, where these stall, by strategy
+iteration.
 
 *Jumps* go to the value of the pair of policies that attains T V (Newton's method, policy iteration
-on both players at once), with sweeps between them. They are fast and may go round in circles. Then
-*strategy iteration* takes a turn (Hoffman and Karp 1966; Patek and Bertsekas 1999 for stochastic
-shortest paths): the tester holds a proper policy, the ego finds its best reply by policy iteration
-in a decision process in which all its policies are proper, and the tester's policy is improved
-where that pays. From a proper policy every improved one is proper: if V <= r + P V held for every
-reply and some reply kept the play from the goals, the mean of r in that recurrent class would be
-at least 0, against the assumption that every end component without goals has a negative gain. So
-V rises to the value, in finitely many steps in readings A and C. Where rounding, or a shift that
-outweighs a gain, breaks that, states fall back to the proper policy that is known from the graph.
+on both players at once), with sweeps between them. They are fast but may cycle. Then *strategy
+iteration* takes over for a round (Hoffman and Karp 1966; Patek and Bertsekas 1999 for stochastic
+shortest paths): the tester holds a proper policy, the ego's best reply is computed by policy
+iteration in a decision process in which all its policies are proper, and the tester's policy is
+improved where that raises the value. From a proper policy every improved one is proper: if V <= r +
+P V held for every reply and some reply kept the play from the goals, the mean of r in that
+recurrent class would be at least 0, against the assumption that every end component without goals
+has a negative gain. So V rises to the value, in finitely many steps in readings A and C. Where
+rounding, or a shift that outweighs a gain, breaks that, states fall back to the proper policy that
+is known from the graph.
 
 Only values of proper pairs are computed (``plays``), and everything is bounded: jumps, policies,
-replies; each takes time in proportion to the game's outcomes, but for direct solutions of at most
+replies; each takes time in proportion to the game's outcomes, except direct solutions of at most
 ``pairs.FALLBACK`` states.
 """
 
@@ -33,11 +35,11 @@ PATIENCE = 4  # jumps in a row that do not halve the residual, before policies a
 POLICIES = 8  # of the tester, in a turn
 REPLIES = 100  # of the ego to each, at most
 NEAR = 100.0  # times the residual wanted, within which there are only jumps
-Tell = Callable[[str, float], None]  # called with what is being done and the residual
+Tell = Callable[[str, float], None]  # called with the current step and the residual
 
 
 class Approximation(NamedTuple):
-    """The best that was met.
+    """The best approximation found.
 
     Attributes:
         value: V, with its last entry 0.
@@ -61,7 +63,7 @@ def approach(
     near: Any = None,
     steps: Floats | None = None,
 ) -> Approximation:
-    """V with |T V + shift - V| <= residual if it can be had.
+    """V with |T V + shift - V| <= residual if possible.
 
     ``near`` is the pair that V is nearly the value of, if one is known: then there are no sweeps,
     as a sweep adds up rounding errors on its way. ``steps``: as in ``pairs``.
@@ -69,7 +71,7 @@ def approach(
     best = _by_jumps(play, value, shift, residual, doing, tell, near, steps)
     if best.left <= 3.0 * residual:
         return best
-    held = play.improved(play.first, best.value, residual)  # a guess, of any worth
+    held = play.improved(play.first, best.value, residual)  # any guess
     for _ in range(TURNS):
         found, better = _by_policies(play, held, best.value, shift, residual, doing, tell)
         best = min(best, found, key=lambda one: one.left)
@@ -93,7 +95,7 @@ def _by_jumps(
     near: Any,
     steps: Floats | None,
 ) -> Approximation:
-    """Jumps until the residual is small, or is not halved any more."""
+    """Jump until the residual is small, or no longer halves."""
     sweeps, before, stuck = play.sweeps if near is None else 0, near, 0
     best = Approximation(value, None, np.inf)
     for _ in range(JUMPS):
@@ -125,14 +127,14 @@ def _same(pair: Any, before: Any) -> bool:
 def _by_policies(
     play: Play, held: Any, value: Floats, shift: Floats, residual: float, doing: str, tell: Tell
 ) -> tuple[Approximation, Any]:
-    """Some steps of strategy iteration: the best that was met, and the policy to go on with.
+    """Some steps of strategy iteration: the best approximation, and the policy to continue with.
 
-    That is None where no policy is better, or a value was not found.
+    The policy is None if no policy is better, or a value was not found.
     """
     best = Approximation(value, None, np.inf)
     for _ in range(POLICIES):
         found = _worst(play, held, value, shift, residual)
-        if found is None:  # so long on the way to a goal that floats cannot tell
+        if found is None:  # the way to a goal is too long for floats
             found = _worst(play, play.first, value, shift, residual)
         if found is None:
             return best, None

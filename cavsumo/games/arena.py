@@ -1,9 +1,9 @@
-"""A game laid out for solving it: goals dropped, states in the order in which values spread.
+"""A game prepared for the solver: without goals, states in the order in which values propagate.
 
-States are renumbered in the order in which values spread (``flow``), so that a value depends mostly
-on values before it and one Gauss-Seidel sweep carries news far.
-Each state has groups of cells, each group cells: in reading A the tester chooses the group (a
-row) and the ego the cell, in reading C the ego the group (its action) and the tester the cell.
+States are renumbered in the order in which values propagate (``flow``), so that a value depends
+mostly on values before it and one Gauss-Seidel sweep updates most of them. Each state has groups of
+cells, each group cells: in reading A the tester chooses the group (a row) and the ego the cell, in
+reading C the ego the group (its action) and the tester the cell.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ BLOCK = 128  # states that are swept at a time, at least
 
 
 class Block(NamedTuple):
-    """A run of states with what belongs to them, starts counted from the run's own."""
+    """A run of states with their groups, cells and outcomes, indices counted from the run's own."""
 
     states: slice
     cells: slice
@@ -63,7 +63,7 @@ class Arena:
 
     @property
     def size(self) -> int:
-        """Number of states that are no goals."""
+        """Number of states that are not goals."""
         return len(self.states)
 
     @cached_property

@@ -22,7 +22,7 @@ def sweep(arena: Arena, value: Floats, shift: Floats) -> None:
 
 
 def _operators(arena: Arena) -> tuple[np.ufunc, np.ufunc]:
-    """What the one who chooses groups does, and the other."""
+    """The operators of the player that chooses groups and of the other player."""
     if arena.reading is Reading.C:
         return np.minimum, np.maximum
     return np.maximum, np.minimum
@@ -50,7 +50,7 @@ def backup(arena: Arena, value: Floats) -> tuple[Floats, Ints]:
 
 
 def answers(arena: Arena, value: Floats, advantage: Floats | None = None) -> Ints:
-    """For each group the cell that the one who answers takes; ``advantage`` where it is known."""
+    """For each group the cell that the answering player takes; ``advantage`` if it is known."""
     if len(arena.group_cell) - 1 == len(arena.cells):
         return np.arange(len(arena.cells))  # no choice
     _, inner = _operators(arena)

@@ -1,8 +1,8 @@
 """Games from Python: from arrays, from a list of transitions, from a function.
 
-Outcomes of a cell that lead to the same state are put together; probabilities that miss 1 by
-rounding are divided by their sum. Integers, fractions and decimal strings are kept as rationals
-beside the floats (``Game.exact``), so that small games can be checked without rounding.
+Outcomes of a cell that lead to the same state are merged; probabilities whose sum differs from 1 by
+rounding are divided by it. Integers, fractions and decimal strings are kept as rationals beside the
+floats (``Game.exact``), so that small games can be checked without rounding.
 """
 
 from __future__ import annotations
@@ -42,7 +42,7 @@ def from_arrays(
         tester_action, ego_action: default: the number of the row in its state, the cell in its row.
 
     Raises:
-        GameError: the arrays are no game.
+        GameError: the arrays do not define a game.
     """
     row_start, cell_start, outcome_start = (
         np.asarray(start, dtype=np.int64) for start in (row_start, cell_start, outcome_start)
@@ -219,7 +219,7 @@ def from_callable(
         limit: on the number of states.
 
     Raises:
-        GameError: more states than the limit, or outcomes that are none.
+        GameError: more states than the limit, or invalid outcomes.
     """
     number: dict[Hashable, int] = {initial: 0}
     waiting, transitions, goals = deque([initial]), [], []

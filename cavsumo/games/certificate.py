@@ -13,8 +13,8 @@ every state
 
 If every end component has negative gain (``components``), these inequalities give L <= V <= U,
 and the tester's policy is proper and earns at least L against any ego: iterate the first one; a
-play that never reached a goal would earn at least -constant, against the gain. All of it is checked
-in floats with room for every rounding error, or, on request, in rationals with none.
+play that never reached a goal would earn at least -constant, against the gain. All inequalities are
+checked in floats with a margin for every rounding error or, on request, exactly in rationals.
 """
 
 from __future__ import annotations
@@ -53,7 +53,7 @@ class Certificate:
 
 
 def holds(game: Game, certificate: Certificate) -> bool:
-    """Whether the inequalities hold in spite of any rounding."""
+    """Whether the inequalities hold for any rounding."""
     kept = _kept(game, certificate)
     return (
         _policies(game, certificate, kept)
@@ -93,9 +93,9 @@ def upper_holds(game: Game, reading: Reading, upper: Floats, ego: Floats, kept: 
 def advantages_of(game: Game, value: Floats) -> tuple[Floats, Floats]:
     """The advantage q(c) - V(s) of every cell, and a bound on its rounding error.
 
-    A sum of k products misses by at most k half-units of the last place of its terms (half of
-    epsilon each), every term by three (p, the difference, the product), probabilities that do not
-    quite sum to 1 by k more.
+    A sum of k products is wrong by at most k half-units of the last place of its terms (half of
+    epsilon each), every term by three (p, the difference, the product), and probabilities that do
+    not exactly sum to 1 add k more.
     """
     finite = np.where(np.isfinite(value), value, 0.0)
     parts = (game.outcome_start, game.successor, game.probability, game.reward, game.cell_state)
@@ -106,7 +106,7 @@ def advantages_of(game: Game, value: Floats) -> tuple[Floats, Floats]:
 
 
 def _mixed(weights: Floats, gain: Floats, start: Ints) -> Floats:
-    """Sums of weights times gains over the parts, lowered by what rounding may have added."""
+    """Sums of weights times gains over the parts, lowered by the largest rounding error."""
     used = np.flatnonzero(weights)
     if len(used) == len(start) - 1 and (weights[used] == 1.0).all():
         in_turn = (start[:-1] <= used) & (used < start[1:])
@@ -129,7 +129,7 @@ def _kept(game: Game, certificate: Certificate) -> Bools:
 
 
 def _policies(game: Game, certificate: Certificate, kept: Bools) -> bool:
-    """Whether the weights are policies of players who know what the reading lets them know."""
+    """Whether the weights are policies that use only the knowledge that the reading gives."""
     reading, tester, ego = certificate.reading, certificate.tester, certificate.ego
     inside = np.isfinite(certificate.lower)
     if not game.n_cells:
@@ -167,7 +167,7 @@ def _by_group(game: Game, ego: Floats, inside: Bools) -> bool:
 
 
 def _one(sums: Any) -> bool:
-    """All are 1, but for rounding; the checks treat them as divided by their sum."""
+    """Whether all are 1 up to rounding; the checks treat them as divided by their sum."""
     return bool((np.abs(sums - 1.0) <= 64 * EPSILON).all())
 
 

@@ -3,8 +3,8 @@
 The limit over n of E[r_1 + ... + r_n]: in a recurrent class it is plus or minus infinity by the
 sign of the mean reward g. With g = 0 it exists if the stationary mean of every phase of the class
 is 0 (a class of period 2 that earns +1, -1, +1, ... has none); then V = r + P V with mean 0 in the
-stationary distribution. A state that may get to classes of both infinities has no value, nor one
-that may get to a class without a limit, unless an infinity settles it.
+stationary distribution. A state that may reach classes of both infinities has no value; nor has a
+state that may reach a class without a limit, unless it also reaches an infinite class.
 """
 
 from __future__ import annotations
@@ -67,7 +67,7 @@ def values(chain: Chain, exact: bool) -> list[Number | None]:
 
 
 def _recurrent(chain: Chain) -> list[list[int]]:
-    """The recurrent classes that are no goals."""
+    """The recurrent classes that are not goals."""
     from scipy.sparse import csr_matrix
     from scipy.sparse.csgraph import connected_components
 

@@ -1,4 +1,4 @@
-"""End components: where a play can stay for ever, and what that earns on average.
+"""End components, in which a play can stay for ever, and their mean rewards.
 
 An end component is a set of cells whose outcomes stay in their states and connect them. When both
 players cooperate to stay, the largest mean reward per step is the *gain* of a maximal end
@@ -6,8 +6,8 @@ component, the least g for which potentials h exist with
 
     g + h(s)  >=  r(c) + sum over s' of T(c, s') h(s')       for every cell c of state s
 
-A game is strongly solvable only if every gain is negative: then whoever never reaches a goal pays
-infinitely much. The gain is a linear program; its sign is proven by h, allowing for rounding.
+A game is strongly solvable only if every gain is negative: a play that never reaches a goal then
+costs infinitely much. The gain is a linear program; its sign is proven by h, allowing for rounding.
 """
 
 from __future__ import annotations
@@ -126,7 +126,7 @@ def _program(
 
 
 def _reward_error(game: Game, cells: Ints) -> Floats:
-    """How far the expected rewards of cells may be from the exact ones."""
+    """Bound on the errors of the expected rewards of cells."""
     return 4.0 * EPSILON * magnitude(game)[cells]
 
 
@@ -140,7 +140,7 @@ def magnitude(game: Game) -> Floats:
 
 
 def _rounding(game: Game, component: EndComponent, part: Any, potential: Floats) -> Floats:
-    """How far the computed r + P h - h may be from the exact one, for each cell."""
+    """Bound on the error of the computed r + P h - h of each cell."""
     terms = part @ np.abs(potential) + np.abs(potential[_own(game, component)])
     terms = terms + np.abs(game.reward[component.cells])
     widest = int(np.diff(game.outcome_start).max())

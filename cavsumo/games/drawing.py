@@ -1,4 +1,4 @@
-"""Where the nodes of a game's picture go, and what it is drawn with."""
+"""The tree of a game for its picture: nodes, edges and their positions."""
 
 from __future__ import annotations
 

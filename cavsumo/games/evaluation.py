@@ -1,4 +1,5 @@
-"""The expected value of a policy profile (seed, eq. 1) and the probability of getting somewhere.
+"""The expected value of a policy profile (seed, eq. 1) and the probability of reaching a set of
+states.
 
     V(pi, h) = sum over a of pi(h, a) sum over s' of T(s, a, s') [R(s, a, s') + V(pi, [h, a, s'])]
 
@@ -36,8 +37,8 @@ def expected_value(
 ) -> Number:
     """V(pi, h) when ``horizon`` more actions are taken, from a history, a state or the initial one.
 
-    Exact where the game and the strategies are rational. With policies that are neither stationary
-    nor Markovian every history is looked at: their number grows exponentially.
+    Exact if the game and the strategies are rational. With policies that are neither stationary nor
+    Markovian all histories are evaluated; their number grows exponentially.
     """
 
     def fold(history: History, later: Callable[[int, int, tuple[int, int]], Number]) -> Number:
@@ -137,7 +138,7 @@ def _mean(
     profile: tuple[int, int],
     later: Callable[[int, int, tuple[int, int]], Number],
 ) -> Number:
-    """The mean of what comes later over the outcomes of a cell."""
+    """The mean of the later values over the outcomes of a cell."""
     return _sum(p * later(cell, s, profile) for s, p in _outcomes(game, cell))
 
 
@@ -159,7 +160,7 @@ def _unfold(
     steps: int,
     start: History | int | None,
 ) -> Number:
-    """The fold over all continuations of a history; over states where policies see no more."""
+    """The fold over all continuations of a history, or over states if that suffices."""
     begin = game.initial if start is None else start
     history = begin if isinstance(begin, History) else History((begin,))
     if all(isinstance(policy, Stationary | Markovian) for policy in policies):
@@ -177,7 +178,7 @@ def _unfold(
 def _known(
     game: Game, ends: Callable[[int], Number | None], state: int, left: int
 ) -> Number | None:
-    """What is decided without looking further: at ends, at goals and beyond the horizon."""
+    """The value where the fold stops: at ends, at goals and beyond the horizon."""
     ended = ends(state)
     if ended is not None:
         return ended

@@ -1,9 +1,10 @@
-"""In which order values spread from the goals: the order of Gauss-Seidel sweeps.
+"""The order in which values propagate from the goals: the order of Gauss-Seidel sweeps.
 
-On a good order one sweep carries news through the whole game, on a bad one a single step; on games
-with a direction (something drives round a ring) that is a factor of a hundred. Which order is good
-is not seen from the game, so several are tried: for a proper policy against some ego, the expected
-number of steps is approached from below in each order, and the order that gets farthest is taken.
+In a good order one sweep propagates values through the whole game, in a bad order by a single step;
+in games with a direction (a vehicle on a ring, say) that is a factor of a hundred. The game does
+not show which order is good, so several are tried: for a proper policy against some ego, the
+expected number of steps is approached from below in each order, and the order with the largest
+result is taken.
 """
 
 from __future__ import annotations

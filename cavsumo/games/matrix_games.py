@@ -3,8 +3,8 @@
 The row player maximises, the column player minimises. Where a pure pair is a saddle point the
 answer is exact, 2 x 2 games have a closed form. Other small games are solved all at once by the
 theorem of Shapley and Snow (1950): some square part of the matrix makes both players indifferent
-and has optimal strategies. Larger ones, and those where rounding blurs that, are linear programs
-(HiGHS).
+and has optimal strategies. Larger games, and those for which rounding spoils this, are linear
+programs (HiGHS).
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ SMALL = 5  # rows and columns up to which square parts are tried
 
 
 class Answers(NamedTuple):
-    """What to play in each of k matrix games of the same shape.
+    """Values and optimal strategies of k matrix games of the same shape.
 
     Attributes:
         value: shape (k,).
@@ -62,7 +62,7 @@ def _two_by_two(m: Floats) -> Answers:
 
 
 def _any_size(matrices: Floats) -> Answers:
-    """By square parts where these do, else by linear programs."""
+    """By square parts if these give the answer, else by linear programs."""
     if max(matrices.shape[1:]) > SMALL:
         return _programs(matrices)
     found, gap = _by_square_parts(matrices)
@@ -75,7 +75,7 @@ def _any_size(matrices: Floats) -> Answers:
 
 
 def _by_square_parts(matrices: Floats) -> tuple[Answers, Floats]:
-    """The best strategies that a square part has, and what they leave open: shape (k,)."""
+    """The best strategies that a square part has, and the gap of their bounds: shape (k,)."""
     k, many, wide = matrices.shape
     found = Answers(np.zeros(k), np.zeros((k, many)), np.zeros((k, wide)))
     gap = np.full(k, np.inf)

@@ -8,8 +8,8 @@ absorbing with reward 0, so they have no actions here. The arrays nest::
     row r    has the cells  cell_start[r] : cell_start[r + 1]          (s, a1, a2)
     cell c   has outcomes   outcome_start[c] : outcome_start[c + 1]    (s, a1, a2, s')
 
-In the seed A = A1 x A2, so all rows of a state have the same ego actions. A game in which the
-ego's actions depend on the tester's is accepted too; only reading A can be asked of it.
+In the seed A = A1 x A2, so all rows of a state have the same ego actions. A game in which the ego's
+actions depend on the tester's is also accepted, in reading A only.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ SUM_TOLERANCE = 1e-9  # probabilities may miss 1 by this much; they are divided 
 
 
 class GameError(InputError):
-    """A game that is none: the message names state, key and what was expected."""
+    """An invalid game; the message names the state, the key and the expectation."""
 
 
 class Exact(NamedTuple):
@@ -64,7 +64,7 @@ class Game:
         initial: initial state.
         outcome_reward: reward of each outcome, None where it is the cell's.
         exact: the same numbers as rationals, None where they are not known.
-        labels: what the states are, for people; None: their numbers.
+        labels: names of the states in messages and pictures; None: their numbers.
         name: of the game.
     """
 
@@ -100,7 +100,7 @@ class Game:
 
     @property
     def fast(self) -> bool:
-        """Whether the game is large enough for compiled loops, and numba is there."""
+        """Whether the game is large enough for compiled loops and numba is installed."""
         return worth_it(len(self.successor))
 
     @cached_property
@@ -160,7 +160,7 @@ class Game:
             yield int(self.successor[k]), float(self.probability[k]), float(reward)
 
     def label(self, state: int) -> str:
-        """What people call a state."""
+        """The name of a state in messages."""
         return str(state if self.labels is None else self.labels[state])
 
 
@@ -184,10 +184,10 @@ def _replies(game: Game) -> tuple[Ints, Ints, Ints]:
 
 
 def check(game: Game) -> Game:
-    """The game itself, if it is one.
+    """The game itself, if it is valid.
 
     Raises:
-        GameError: it has no goal, a state without actions, a probability that is none, ...
+        GameError: it has no goal, a state without actions, an invalid probability, ...
     """
     _check_states(game)
     _check_outcomes(game)
@@ -234,7 +234,7 @@ def _check_outcomes(game: Game) -> None:
 
 
 def _every(game: Game, good: Bools, what: str, expected: str) -> None:
-    """GameError naming the first outcome that is not good."""
+    """Raise GameError that names the first invalid outcome."""
     bad = np.flatnonzero(~good)
     if len(bad):
         cell = int(np.searchsorted(game.outcome_start, bad[0], side="right")) - 1

@@ -1,10 +1,10 @@
 """The value of one proper pair of policies: a linear system (I - P) V = r.
 
 Small systems by a sparse factorisation, large ones by BiCGSTAB preconditioned with one
-Gauss-Seidel sweep, which in the arena's order carries news from the goals through the game.
-I - P is regular because a goal is reached from every state (``reach``). How accurate a value is,
-is judged by the rewards and the expected number of steps t, (I - P) t = 1: |V| is at most the
-largest reward times t, and floats place it no better than that times their precision.
+Gauss-Seidel sweep, which in the arena's order propagates values from the goals through the game.
+I - P is regular because a goal is reached from every state (``reach``). The accuracy of a value
+follows from the rewards and the expected number of steps t, (I - P) t = 1: |V| is at most the
+largest reward times t, and its rounding error is in proportion to that bound.
 """
 
 from __future__ import annotations
@@ -52,7 +52,7 @@ def pair_value(
     """
     pair = _Pair(transitions, reward, fast)
     with warnings.catch_warnings(), np.errstate(all="ignore"):
-        warnings.simplefilter("ignore")  # what is not accurate is not returned
+        warnings.simplefilter("ignore")  # an inaccurate value is not returned
         if len(reward) > DIRECT:
             found = _refined(pair, start, residual, precise, _krylov(pair), steps)
             if found is not None or len(reward) > FALLBACK:
@@ -128,7 +128,7 @@ def _bounds_steps(counting: _Pair, steps: Floats) -> bool:
 
 
 def coarseness(value: Floats) -> float:
-    """How far rounding V to floats may move an advantage: a unit of its last place."""
+    """Bound on the change of an advantage by rounding V to floats: a unit of its last place."""
     return float(np.spacing(np.abs(value).max(initial=0.0)))
 
 

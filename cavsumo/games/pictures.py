@@ -40,7 +40,7 @@ STATES_DRAWN = 40  # in the picture of a policy
 
 
 def draw_tree(game: Game, verdict: Solvability, solution: Solution | None, file: Path) -> None:
-    """Draw the game's tree, what the policies play in colour; raises InputError if it is too big.
+    """Draw the game's tree, the policies' choices in colour; raises InputError if it is too big.
 
     Each state is unfolded once; where it is met again a dashed circle stands for it.
     """
@@ -67,7 +67,7 @@ def _taken(solution: Solution | None, cell: int) -> tuple[bool, bool]:
 
 
 def _branches(axes: Axes, node: Node, tester_first: bool, lit: bool = True) -> None:
-    """A node, its edges and everything below; lit where the play may get."""
+    """Draw a node, its edges and all nodes below; in colour where the play may come."""
     for i, child in enumerate(node.children):
         on = lit and child.chosen
         colour = _edge_colour(node.kind, tester_first) if on else QUIET
@@ -91,7 +91,7 @@ def _branches(axes: Axes, node: Node, tester_first: bool, lit: bool = True) -> N
 
 
 def _edge_colour(kind: str, tester_first: bool) -> str:
-    """Who chooses among the edges below a node."""
+    """The colour of the player that chooses among the edges below a node."""
     if kind == "state":
         return TESTER if tester_first else EGO
     return {"ego": EGO, "tester": TESTER}.get(kind, INK)
@@ -122,7 +122,7 @@ def _mark(axes: Axes, node: Node, lit: bool) -> None:
 
 
 def _title(game: Game, verdict: Solvability, solution: Solution | None) -> str:
-    """What is shown."""
+    """The title of the picture."""
     name = game.name or "game"
     if solution is None:
         return f"{name}: not solvable in reading {verdict.reading}"
@@ -173,7 +173,7 @@ def _finish(figure: Figure, axes: Axes, title: str, legend: list[Line2D], file: 
 
 
 def draw_policy(game: Game, verdict: Solvability, solution: Solution | None, file: Path) -> None:
-    """Draw what the policies make of the game: the states that are met, from left to right.
+    """Draw the play of the policies: the states that it reaches, from left to right.
 
     States with larger values stand higher; an arrow is a step that may be made, with its
     probability.
@@ -259,7 +259,7 @@ def _places(
 def _state(
     axes: Axes, game: Game, solution: Solution, state: int, place: tuple[float, float], moves: str
 ) -> None:
-    """A state with its value and what the tester plays there."""
+    """Draw a state with its value and the tester's action there."""
     goal = bool(game.goal[state])
     axes.scatter(*place, s=620, facecolor=GOAL if goal else TESTER, edgecolor=INK, zorder=4)
     axes.text(*place, game.label(state), color="white", ha="center", va="center", zorder=5)

@@ -1,15 +1,14 @@
 """The three readings behind one interface: sweep, back up, value a pair of policies.
 
-What ``solve`` does to a game is the same in every reading; how a state is backed up and what a
-pair of policies is differs (``turn_based``, ``simultaneous``). Values have a last entry, 0, for the
-goals.
+``solve`` is the same in every reading; the backup of a state and the form of a pair of policies
+differ (``turn_based``, ``simultaneous``). Values have a last entry, 0, for the goals.
 
 A pair of policies is *proper* when it reaches a goal from every state with probability 1. In a
-finite chain that is a question of its graph: a goal can be reached from every state. Only the
+finite chain this depends on its graph alone: a goal can be reached from every state. Only the
 values of proper pairs are computed, because only their systems are regular. An improper pair is
-made proper first: in the states that cannot get to a goal the tester plays the policy by which the
-almost-sure region was found. That is enough: no play can stay among those states then, for that
-policy is proper; and from the states outside a goal is reached without passing through them.
+made proper first: in the states that cannot reach a goal the tester plays the policy by which the
+almost-sure region was found. This suffices: no play can then stay among those states, because that
+policy is proper, and from the other states a goal is reached without passing through them.
 """
 
 from __future__ import annotations

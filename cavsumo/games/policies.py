@@ -1,7 +1,7 @@
 """Histories, strategies and policies (seed, section 2.1).
 
-A strategy is a mapping from actions to positive probabilities that sum to 1, a policy says for
-every history which strategy its player follows. A history of length t holds t states and t - 1
+A strategy is a mapping from actions to positive probabilities that sum to 1, a policy assigns to
+every history the strategy that its player follows. A history of length t holds t states and t - 1
 action profiles, so its last state is decided at decision-step t.
 """
 
@@ -48,7 +48,7 @@ class History(NamedTuple):
 
 
 class Policy(Protocol):
-    """What a player does in every history."""
+    """The strategy of a player in every history."""
 
     def strategy(self, history: History) -> Strategy:
         """The distribution over the player's actions."""
@@ -56,10 +56,10 @@ class Policy(Protocol):
 
 @dataclass(frozen=True)
 class Stationary:
-    """A policy that looks at the state alone.
+    """A policy that depends on the state alone.
 
     Attributes:
-        table: the strategy in each state that is no goal.
+        table: the strategy in each state that is not a goal.
     """
 
     table: Mapping[int, Strategy]
@@ -71,7 +71,7 @@ class Stationary:
 
 @dataclass(frozen=True)
 class Markovian:
-    """A policy that looks at the state and the decision-step.
+    """A policy that depends on the state and the decision-step.
 
     Attributes:
         decide: (state, decision-step from 1) to a strategy.
@@ -86,7 +86,7 @@ class Markovian:
 
 @dataclass(frozen=True)
 class HistoryDependent:
-    """A policy that may look at everything that happened.
+    """A policy that may depend on the whole history.
 
     Attributes:
         decide: a history to a strategy.
@@ -129,7 +129,7 @@ def joint(
     """The cells of a state that are played: cell, profile, probability pi(h, a).
 
     Raises:
-        GameError: a strategy is none, or plays an action that the state has not.
+        GameError: an invalid strategy, or one with an action that the state does not have.
     """
     for player, strategy, actions in (
         ("tester", tester, tester_actions(game, state)),
@@ -195,7 +195,7 @@ def is_stationary(game: Game, policy: Policy, steps: int = 3) -> bool:
 
 
 def _decisions(game: Game, policy: Policy, steps: int) -> Iterator[tuple[History, Strategy]]:
-    """The histories of up to ``steps`` states that end where there is something to decide."""
+    """The histories of up to ``steps`` states that end in a state with a decision."""
     for length in range(1, 2 if isinstance(policy, Stationary) else steps + 1):
         for history in histories(game, length):
             if not game.goal[history.state]:
@@ -213,7 +213,7 @@ def _agree(decisions: Iterator[tuple[Any, Strategy]]) -> bool:
 
 
 class Execution(NamedTuple):
-    """A play as it happened.
+    """One play of the game.
 
     Attributes:
         history: states and profiles.

@@ -2,8 +2,9 @@
 
 To the letter, pi1 is proper at a state if some t has P(G | s, pi1, pi2, t) = 1 for every pi2: the
 goal is *sure* within t steps. *Almost surely* asks lim over t of P = 1 for every pi2. A self-loop
-of probability 1/2 parts the two. Both are decided for stationary policies, pure or mixed, against
-every policy of the ego; ``evaluation.least_reach_probability`` looks at other policies up to t.
+of probability 1/2 distinguishes the two. Both are decided for stationary policies, pure or mixed,
+against every policy of the ego; ``evaluation.least_reach_probability`` looks at other policies up
+to t.
 """
 
 from __future__ import annotations
@@ -69,7 +70,7 @@ def _proper_states(game: Game, tester: Stationary, literal: bool) -> list[bool]:
 
 
 def _options(game: Game, tester: Stationary) -> Options:
-    """What may come next in each state under a policy of the tester, by the ego's action."""
+    """The possible successors of each state under a policy of the tester, by the ego's action."""
     options: Options = {}
     for state in np.flatnonzero(~game.goal).tolist():
         after: dict[int, set[int]] = {action: set() for action in ego_actions(game, state)}
@@ -84,7 +85,7 @@ def _options(game: Game, tester: Stationary) -> Options:
 
 
 def literally_solvable(game: Game, limit: int = 20_000, *, literal: bool = True) -> bool | None:
-    """Solvable as the seed writes it, over pure stationary policies; None beyond the limit.
+    """Whether the game is solvable by the seed's literal definition; None beyond the limit.
 
     Some policy is proper (reading A), and every improper one has, at each state where it is
     improper, an ego against which it earns minus infinity. A policy that reaches the goal almost

@@ -1,4 +1,4 @@
-"""The states of a Markov chain that can get to its last one, found in its graph without floats."""
+"""The states of a Markov chain that can reach its last state, from its graph without floats."""
 
 from __future__ import annotations
 

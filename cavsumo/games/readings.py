@@ -1,4 +1,4 @@
-"""Who knows what when both choose: the three readings of an SSP game.
+"""The three readings of an SSP game: the order of the players' choices.
 
 A: the tester commits first, to a pure choice, and the ego answers: max over a1 of min over a2.
    The tree of the seed's Figure 2, and the only reading whose tests hold against any ego.
@@ -14,7 +14,7 @@ from enum import StrEnum
 
 
 class Reading(StrEnum):
-    """Which reading of the game is asked for."""
+    """A reading of the game."""
 
     A = "A"
     B = "B"

@@ -1,6 +1,6 @@
-"""Where the tester can force a goal: surely (seed, eq. 2 to the letter) and almost surely.
+"""The regions from which the tester can force a goal: surely (seed, eq. 2) and almost surely.
 
-Both are attractors: a state joins when the tester has a move that leads on, whatever the ego does.
+Both are attractors: a state joins if the tester has a move that leads on against every ego action.
 *Surely* means that every outcome leads on, so that there is a t with P(G | h, pi1, pi2, t) = 1 for
 all pi2; the number of the layer is the least such t. *Almost surely* (lim over t of P = 1) means
 that some outcome leads on and none leaves the region, the greatest X with
@@ -10,9 +10,9 @@ that some outcome leads on and none leaves the region, the greatest X with
     C:  the same with  A a2 E a1:  supp inside X  and  supp meets Y
 
 (de Alfaro, Henzinger and Kupferman, Concurrent reachability games, 2007; B with mixed strategies).
-Each attractor takes time linear in the size of the game: every outcome counts down what its cell
-lacks, every cell what its group lacks, every group what its state lacks. Groups are the rows of a
-state where the tester moves first, the ego's actions where the ego does.
+Each attractor takes time linear in the size of the game: every outcome counts down the missing
+parts of its cell, every cell those of its group, every group those of its state. Groups are the
+rows of a state where the tester moves first, the ego's actions where the ego does.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ from cavsumo.games.model import Bools, Game, Ints
 from cavsumo.games.readings import Reading
 from cavsumo.games.segments import firsts, spans
 
-NEVER = np.iinfo(np.int32).max  # lacking so much, nothing is ever complete
+NEVER = np.iinfo(np.int32).max  # so many missing parts that it is never complete
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,8 +38,8 @@ class Region:
         layer: the step of the attractor in which each joined, 0 at goals, -1 outside.
         moves: the cells by which states joined, as a mask: in reading A all cells of the row that
             the tester plays, in B and C those that answer the ego's actions.
-        outside: the states left over by the first attractor: there the ego can keep the play
-            away from every goal for ever.
+        outside: the states outside the first attractor, in which the ego can keep the play away
+            from every goal for ever.
     """
 
     inside: Bools
@@ -49,9 +49,9 @@ class Region:
 
 
 def sure_region(game: Game, reading: Reading = Reading.A) -> Region:
-    """Where a goal is reached within ``layer`` steps, whatever the ego and chance do.
+    """The region in which a goal is reached within ``layer`` steps for every ego and outcome.
 
-    Mixing is of no help here, so B is A.
+    Mixing does not help here, so B equals A.
     """
     every = np.ones(game.n_cells, dtype=bool)
     layer, moves = _attract(game, reading is Reading.C, every, np.diff(game.outcome_start))
@@ -59,7 +59,7 @@ def sure_region(game: Game, reading: Reading = Reading.A) -> Region:
 
 
 def almost_sure_region(game: Game, reading: Reading = Reading.A) -> Region:
-    """Where the tester has a policy that reaches a goal with probability 1 against any ego."""
+    """The region in which a policy reaches a goal with probability 1 against every ego."""
     inside = np.ones(game.n_states, dtype=bool)
     first: Bools | None = None
     while True:
@@ -73,7 +73,7 @@ def almost_sure_region(game: Game, reading: Reading = Reading.A) -> Region:
 
 
 def keeping(game: Game, reading: Reading, inside: Bools) -> Bools:
-    """The cells that the tester may use to stay inside, whatever the ego does."""
+    """The cells that the tester may use to stay inside against every ego action."""
     if inside.all():
         return np.ones(game.n_cells, dtype=bool)
     kept: Bools = inside[game.cell_state] & (game.matrix @ (~inside).astype(float) == 0)
@@ -139,7 +139,7 @@ def _level(lacking: Ints, whole: Ints) -> _Level:
 
 
 def _spread(game: Game, cells: _Level, groups: _Level, states: _Level) -> None:
-    """Set the steps of everything from which goals are reached."""
+    """Set the steps of all parts from which goals are reached."""
     start, entering = game.entering
     if game.fast:
         from cavsumo.games.compiled import graphs
@@ -156,7 +156,7 @@ def _spread(game: Game, cells: _Level, groups: _Level, states: _Level) -> None:
 
 
 def _completed(level: _Level, parts: Ints, step: int) -> Ints:
-    """What the parts that came, each naming what it belongs to, made complete."""
+    """The wholes that are completed by new parts, each of which names its whole."""
     np.subtract.at(level.lacking, parts, 1)
     found = np.sort(parts[level.lacking[parts] <= 0])
     found = found[np.diff(found, prepend=-1) > 0]  # each once

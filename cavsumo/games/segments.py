@@ -1,4 +1,4 @@
-"""Arrays in parts: where each part begins, and whose part each entry is."""
+"""Arrays in parts: the beginning of each part, and the owner of each entry."""
 
 from __future__ import annotations
 
@@ -24,12 +24,12 @@ def spans(start: Ints, which: Ints, fast: bool = False) -> Ints:
 
 
 def starts(sizes: Ints) -> Ints:
-    """Where parts of these sizes begin, and where the last ends."""
+    """The beginnings of parts of these sizes, and the end of the last."""
     return np.concatenate(([0], np.cumsum(sizes)))
 
 
 def firsts(places: Ints, owner: Ints) -> Ints:
-    """The first place of each owner; the places of an owner stand together."""
+    """The first index of each owner; the entries of an owner are adjacent."""
     owners = owner[places]
     first = np.ones(len(places), dtype=bool)
     first[1:] = owners[1:] != owners[:-1]

@@ -1,10 +1,10 @@
-"""Solvable or not, and what stands against it.
+"""Whether a game is solvable, with a witness if it is not.
 
 A game is *strongly* solvable in a reading if (1) from every state the tester has a policy that is
 proper (reaches a goal almost surely against any ego) and (2) every play that never does earns
 minus infinity: every end component has negative gain. Then the Bellman operator has exactly one
-fixed point. The seed's own definition asks of (2) less, of each improper policy that *some* ego
-makes it earn minus infinity (``literal``); it is reported where it can be decided.
+fixed point. The seed's own definition demands less than (2): for each improper policy there is
+*some* ego that makes it earn minus infinity (``proper.literally_solvable``).
 """
 
 from __future__ import annotations
@@ -27,8 +27,8 @@ class Trap:
 
     Attributes:
         states: those in which the ego can keep the play away from every goal for ever.
-        lost: all states without a proper policy; in those that are not in ``states`` the tester
-            cannot go for a goal without the risk of getting there.
+        lost: all states without a proper policy; from those that are not in ``states`` every
+            attempt to reach a goal may lead into ``states``.
     """
 
     states: Ints
@@ -95,7 +95,7 @@ def solvability(game: Game, reading: Reading = Reading.A) -> Solvability:
 def free_cycle(game: Game) -> Cycle | None:
     """An end component whose gain is not negative, if there is one.
 
-    Where no reward is positive, that is one of rewards 0 alone: a question of the graph.
+    If no reward is positive, its rewards are all 0, which the graph alone decides.
     """
     if not game.n_cells:
         return None
@@ -119,7 +119,7 @@ def _cycle(game: Game, cells: Ints, value: float) -> Cycle:
 
 
 def _trap_in_words(game: Game, trap: Trap, reading: Reading) -> str:
-    """The trap as a sentence."""
+    """The trap described in a sentence."""
     words = f"in {_states(game, trap.states)} the ego can keep the play from every goal for ever"
     if reading is not Reading.C:
         words += f" ({reading.order})"
@@ -130,7 +130,7 @@ def _trap_in_words(game: Game, trap: Trap, reading: Reading) -> str:
 
 
 def _cycle_in_words(game: Game, cycle: Cycle) -> str:
-    """The cycle as a sentence."""
+    """The cycle described in a sentence."""
     moves = [
         f"{game.label(int(game.cell_state[c]))}: {game.tester_action[game.cell_row[c]]}, "
         f"{game.ego_action[c]}"

@@ -1,17 +1,17 @@
 """Expectiminimax values and policies (seed, eq. 3), between certified bounds.
 
 1. Decide whether the game is solvable; refuse it with a witness when it is not.
-2. Start from the value of the pair of policies that a few sweeps from V = 0 come to, made proper
-   where it does not reach a goal (``plays``).
+2. Start from the value of the pair of policies after a few sweeps from V = 0, made proper where it
+  does not reach a goal (``plays``).
 3. Approach the fixed point of the Bellman operator T (``approach``).
 4. Solve the game once more with every reward lowered by a little e, and once with it raised: when
-   the residuals are below e, the two solutions satisfy the inequalities of ``certificate``, so
-   they enclose the value whatever happened before. e follows from the precision that is asked
-   for and the expected number of steps, as each step shifts the value by e.
+  the residuals are below e, the two solutions satisfy the inequalities of ``certificate``, so they
+  enclose the value independently of the steps before. e follows from the required precision and the
+  expected number of steps, as each step shifts the value by e.
 
-Nothing relies on a small change of V per iteration: where goals are approached slowly, that says
-nothing about how far V is from the value. Every loop is bounded; a solver that does not get there
-says how far it came (``NotCertified``).
+A small change of V per iteration is not a stopping rule: where goals are approached slowly, V may
+still be far from the value. Every loop is bounded; a solver that does not reach the precision
+reports the bounds or the residual that it reached (``NotCertified``).
 """
 
 from __future__ import annotations
@@ -51,18 +51,18 @@ class Unsolvable(CavsumoError):
 
 
 class NotCertified(CavsumoError):
-    """No bounds could be proven in floats, or not in the time given; says how far it came."""
+    """No bounds were proven in floats or within the time limit; the message has the progress."""
 
 
 @dataclass(frozen=True, eq=False)
 class Solution:
-    """What is known of a game's value.
+    """The bounds on a game's value, with their proof.
 
     Attributes:
         verdict: solvability and regions.
         certificate: the bounds and the policies that prove them. The tester's policy is the test:
             proper, and worth at least the lower bound against any ego.
-        precision: which was asked for.
+        precision: the required one.
     """
 
     verdict: Solvability
@@ -87,12 +87,12 @@ class Solution:
 
     @property
     def precise(self) -> bool:
-        """Whether the precision asked for was reached."""
+        """Whether the required precision was reached."""
         return self.width <= self.precision
 
 
 def _silent(_: str, __: float) -> None:
-    """Tell nobody."""
+    """Report nothing."""
 
 
 def solve(
@@ -107,11 +107,11 @@ def solve(
     """Bounds on the value of every state, at most ``precision`` apart, with optimal policies.
 
     Args:
-        precision: absolute. Where floats are too coarse for it the bounds are as close as they
+        precision: absolute. If floats are too coarse for it, the bounds are as close as floats
             allow (``Solution.precise``).
-        trim: solve what can be solved: states from which no goal can be forced get -inf.
-        time_limit: seconds after which to give up, looked at between steps.
-        tell: called now and then.
+        trim: solve the solvable part: states from which no goal can be forced get -inf.
+        time_limit: seconds after which to give up, checked between steps.
+        tell: called with each step for a progress display.
 
     Raises:
         Unsolvable: the game is not strongly solvable in this reading.
@@ -137,7 +137,7 @@ def solve(
 
 
 def _within(limit: float | None, tell: Tell) -> Tell:
-    """A ``tell`` that ends the work when its time is over."""
+    """A ``tell`` that raises NotCertified when the time limit has passed."""
     if limit is None:
         return tell
     end = time.monotonic() + limit
@@ -159,13 +159,13 @@ def _play(game: Game, reading: Reading, states: Ints, kept: Bools | None, moves:
 
 
 def _trivial(game: Game, reading: Reading, inside: Bools) -> Certificate:
-    """Nothing but goals, and perhaps states from which none can be forced."""
+    """The solution of a game of goals and states from which none can be forced."""
     value, none = np.where(inside, 0.0, -np.inf), np.zeros(game.n_cells)
     return Certificate(reading, value, value, none, none)
 
 
 def _start(play: Play) -> Floats:
-    """Nearly the value of the pair of policies that a few sweeps come to, made proper."""
+    """Nearly the value of the pair of policies after a few sweeps, made proper."""
     value = np.zeros(play.arena.size + 1)
     none = np.zeros_like(value)
     for _ in range(FIRST_SWEEPS if play.sweeps else 0):
@@ -184,7 +184,7 @@ def _scale(play: Play) -> float:
 def _certified(
     game: Game, verdict: Solvability, play: Play, value: Floats, precision: float, tell: Tell
 ) -> Certificate:
-    """Bounds that hold, as close as was asked for if floats allow it."""
+    """Proven bounds, within the required precision if floats allow it."""
     none = np.zeros_like(value)
     scale = _scale(play)
     value, pair, left = approach(play, value, none, 1e-4 * scale, "the value", tell)
@@ -200,13 +200,13 @@ def _certified(
 
 
 class _Near(NamedTuple):
-    """What is known of the value before there are bounds.
+    """The approximate value before there are bounds.
 
     Attributes:
         value: nearly V.
         pair: attains T V.
         steps: nearly the expected numbers of steps to a goal.
-        noise: how far rounding may take an advantage, for each state.
+        noise: bound on the rounding error of an advantage, for each state.
     """
 
     value: Floats
@@ -218,7 +218,7 @@ class _Near(NamedTuple):
 def _closest(
     game: Game, verdict: Solvability, play: Play, near: _Near, precision: float, tell: Tell
 ) -> Certificate:
-    """Bounds tried with one e after another, until they hold and are close enough."""
+    """Bounds from one e after another, until they hold and are close enough."""
     best, e = None, precision / (3.0 * float(near.steps.max()))
     for _ in range(ATTEMPTS):
         e = max(e, 1.25 * coarseness(near.value))
@@ -244,10 +244,10 @@ def _width(found: Certificate) -> float:
 
 
 def _noise(game: Game, reading: Reading, play: Play, value: Floats, left: float) -> Floats:
-    """For each state how far rounding may take an advantage that ought to be 0, with room to spare.
+    """For each state a generous bound on the rounding error of an advantage that is exactly 0.
 
-    Most cells that matter lead to states of nearly the same value; only those that do not, such as
-    an accident that throws far back, need more room than a unit of the last place.
+    Most relevant cells lead to states of nearly the same value; only the others, such as an
+    accident with a large loss, have an error above a unit of the last place.
     """
     whole = np.zeros(game.n_states)
     whole[play.arena.states] = value[:-1]

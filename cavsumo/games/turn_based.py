@@ -108,7 +108,7 @@ class TurnBased:
         return self._choices(game, pair, game.ego_action)
 
     def _answers(self, game: Game, value: Floats) -> Floats:
-        """The answers of the player who moves second, in every group of cells."""
+        """The answers of the player that moves second, in every group of cells."""
         weights = np.zeros(game.n_cells)
         weights[self.arena.cells[backups.answers(self.arena, value)]] = 1.0
         return weights

@@ -1,8 +1,8 @@
-"""A trace as SUMO's floating car data: what ``sumo --fcd-output`` writes, read by SUMO's tools.
+"""A trace as SUMO's floating car data, the format of ``sumo --fcd-output`` and SUMO's tools.
 
 https://sumo.dlr.de/docs/Simulation/Output/FCDOutput.html: positions are those of the middle of the
 front edge [m], angles degrees clockwise from north. The testers and the ego are among the others;
-pedestrians are persons. What only SUMO knows (lane, pos, slope) is left out.
+pedestrians are persons. SUMO's own values (lane, pos, slope) are left out.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
-"""A trace shown in sumo-gui: every body is put where it was, timestep by timestep.
+"""A trace shown in sumo-gui: every body is placed as recorded, timestep by timestep.
 
-Nothing is simulated here: sumo-gui has the network, is given the ego's route as a polygon, and is
-told by TraCI where everybody is. It runs in a process of its own and comes with the extra ``[osm]``
+This file does not simulate: sumo-gui has the network, receives the ego's route as a polygon, and
+all positions by TraCI. It runs in a separate process and comes with the extra ``[osm]``
 (eclipse-sumo and traci).
 """
 
@@ -28,14 +28,14 @@ from cavsumo.results.traces import Shape, Trace, states
 from cavsumo.sumo.poses import to_sumo
 
 COLORS = {"ego": "31,95,191", "tester": "217,72,15", "background": "120,128,136"}
-SHAPES = {"passenger": "passenger", "car": "passenger"}  # SUMO's names of what is drawn
+SHAPES = {"passenger": "passenger", "car": "passenger"}  # SUMO's names of the shapes
 VIEW = "View #0"
 ZOOM = 1500.0  # per cent; some 80 m across the window
 KEEP_EXACT = 2  # moveToXY: exactly there, on the network or off it
 DELAY_MOST = 60_000.0  # ms
-CONNECT_S = 60  # how long sumo-gui may take to start
+CONNECT_S = 60  # longest time for sumo-gui to start
 ROUTE_WIDTH, ROUTE_LAYER = 0.3, 10  # m; above the lanes, below the bodies
-WAY = "cavsumo_way"  # a route that every vehicle is given; nobody follows it
+WAY = "cavsumo_way"  # a route for every vehicle, which none follows
 
 
 def check_gui(delay_ms: float | None = None) -> Path:
@@ -81,7 +81,7 @@ def show(
             words, env=sumo_environment(sumo_home()), stdin=subprocess.DEVNULL, stdout=sys.stderr
         )
         try:
-            with contextlib.redirect_stdout(io.StringIO()):  # it tells of every attempt
+            with contextlib.redirect_stdout(io.StringIO()):  # it prints every attempt
                 sumo = traci.connect(port, CONNECT_S, proc=process, waitBetweenRetries=1)
         except (traci.TraCIException, traci.FatalTraCIError) as error:
             process.kill()
@@ -141,7 +141,7 @@ def _type(part: str, shape: Shape) -> str:
 
 
 def _play(sumo: Any, trace: Trace, site: Site) -> None:
-    """Put everybody in place, frame by frame."""
+    """Place all bodies, frame by frame."""
     sumo.route.add(WAY, [site.route.edges[0]])
     shapes, shown = trace.shapes(), set[str]()
     for frame in trace.frames:
@@ -165,6 +165,6 @@ def _play(sumo: Any, trace: Trace, site: Site) -> None:
 
 
 def _set_lights(sumo: Any, frame: Mapping[str, Any], site: Site) -> None:
-    """Have the lights on the ego's route show what they showed."""
+    """Set the lights on the ego's route to their recorded states."""
     for light, letter in zip(site.lights, frame.get("lights", ""), strict=False):
         sumo.trafficlight.setLinkState(light.id, light.link, letter)

@@ -1,6 +1,6 @@
-"""What a test is made of: bodies and their kinematics, shapes, snapshots, the scenario record.
+"""The parts of a test: bodies and their kinematics, shapes, snapshots, the scenario record.
 
-Also what every other room needs: seeds, checks of numbers, registries, plugins of the user.
-Nothing here reads a network, decides an action or knows SUMO.
+Also the tools of all other rooms: seeds, checks of numbers, registries, plugins of the user.
+No file here reads a network, decides an action or imports SUMO.
 To add a setting: a field in ``scenario/record`` or ``plan``. To add a kind of body: ``bodies``.
 """

@@ -22,7 +22,7 @@ THROTTLE, STEERING = "throttle", "steering"
 
 @dataclass(frozen=True, slots=True)
 class Kind:
-    """What a body is: its box and the limits of its kinematics.
+    """A kind of body: its box and the limits of its kinematics.
 
     Attributes:
         name: the kind's name.
@@ -31,8 +31,8 @@ class Kind:
         v_min, v_max: speed limits [m/s].
         throttle_min, throttle_max: limits of the throttle, an acceleration [m/s2].
         steering_max: largest steering angle to either side [rad].
-        reach: no point of the box is farther from its centre [m].
-        inner: no point of its outline is nearer to its centre [m].
+        reach: largest distance of a point of the box from its centre [m].
+        inner: smallest distance of a point of its outline from its centre [m].
         turning: sin(beta) at full steering, which limits its turns (see ``kinematics``).
     """
 
@@ -62,7 +62,7 @@ def turn_radius(kind: Kind) -> float:
 
 
 def detour(kind: Kind, o: float, heading: float) -> float:
-    """How much longer a way gets by turning from o to its heading first, at full steering [m].
+    """Extra length of a way due to turning from o to its heading first, at full steering [m].
 
     A body turning by phi on the radius R = b / (2 sin beta) goes R phi and gains R sin phi.
     """
@@ -94,14 +94,14 @@ def kind_named(name: str) -> Kind:
 
 
 class Body(NamedTuple):
-    """One body of the simulation: who it is and what it is."""
+    """One body of the simulation: its id and its kind."""
 
     id: str
     kind: Kind
 
 
 class Action(NamedTuple):
-    """What a body's two effectors do for one timestep."""
+    """The actions of a body's two effectors for one timestep."""
 
     throttle: float  # m/s2
     steering: float  # rad, positive to the left

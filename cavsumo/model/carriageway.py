@@ -1,4 +1,4 @@
-"""Where the carriageway is, how to get across it and along it, on any road of any network.
+"""Carriageways, and the ways across and along them, on any road of any network.
 
 Pure geometry (shapely): built from polygons and lane axes, knows neither files nor SUMO.
 """
@@ -72,9 +72,9 @@ class MarkedCrossing:
         id: of the crossing in the network.
         begin, end: where the ego's path enters and leaves its surface [m].
         surface: the crossing.
-        light: id of the traffic light that controls it, and the index of its letter there for who
-            walks over it; None without.
-        priority: whether pedestrians on it go before vehicles, as on a zebra crossing.
+        light: id of the traffic light that controls it, and the index of its letter for pedestrians
+            there; None without.
+        priority: whether pedestrians on it have priority, as on a zebra crossing.
     """
 
     id: str
@@ -112,12 +112,12 @@ class Approach:
         type: a ``vocabulary.ApproachType``.
         path: centre line of its lanes, through the junction and on.
         edges: ids of the edges along it.
-        wait: where a body waits that gives way; infinite where there is nothing to wait for.
+        wait: where a body waits that gives way; infinite if it need not wait.
         enter, leave: where a body begins to touch the strip that the ego sweeps, and where it
             no longer does (infinite if it stays); beside the ego's lane, where the lanes begin
             and cease to run side by side.
         ego_enter: arc length on the ego's path at which it would touch a body that enters.
-        yields: whether the traffic rules or lights make it give way to the ego.
+        yields: whether traffic rules or lights require it to give way to the ego.
         speed, ego_speed: speed limits on the ways to there, its own and the ego's [m/s].
         into: for a lane beside the ego's, the ego's own lane and on.
     """
@@ -145,7 +145,7 @@ class Start:
         lateral: offset from that axis, positive to its left [m].
         forwards: whether the body faces along the axis (True) or against it.
         walk: ids of edges along which SUMO may believe a person here to walk.
-        approach: the way that a vehicle drives, None for who walks.
+        approach: the way that a vehicle drives, None for a pedestrian.
         v: speed [m/s]; None leaves it to the scenario.
     """
 
@@ -158,6 +158,27 @@ class Start:
     walk: tuple[str, ...] = ()
     approach: Approach | None = None
     v: float | None = None
+
+
+class StartRecord(NamedTuple):
+    """A start as plain data; what belongs to the site is named by its number there.
+
+    Attributes:
+        x, y, o, v: as of a Start.
+        place: number of the site's area that the body starts on, or of the approach that it drives
+            on; None for neither.
+        lateral, forwards: as of a Start.
+        edges: of the walk or of the approach, by which the place is known again.
+    """
+
+    x: float
+    y: float
+    o: float
+    v: float | None = None
+    place: int | None = None
+    lateral: float = 0.0
+    forwards: bool = True
+    edges: tuple[str, ...] = ()
 
 
 class Roads:

@@ -1,4 +1,4 @@
-"""Checks of single numbers, with one sentence when they fail."""
+"""Checks of single values; each error is one sentence."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The checksum by which a file is known again."""
+"""The checksum that identifies a file."""
 
 from __future__ import annotations
 

@@ -59,8 +59,8 @@ def in_frame(box: Box, x: float, y: float, heading: float) -> Box:
 def overlap(a: Box, b: Box) -> bool:
     """Return whether the boxes overlap or touch, that is, come within `TOUCH` of each other.
 
-    Separating axes: two rectangles are apart if and only if their shadows are apart on one of the
-    four directions of their sides.
+    Separating axes: two rectangles are disjoint if and only if their projections on one of the four
+        directions of their sides are.
     """
     ax, ay, ah, al, aw = a
     bx, by, bh, bl, bw = b

@@ -1,4 +1,4 @@
-"""Agents of a batch by their labels: ``NAME``, or ``LABEL=NAME`` to tell two of one name apart."""
+"""Labels of the agents of a batch: ``NAME``, or ``LABEL=NAME`` for a second agent of that name."""
 
 from __future__ import annotations
 
@@ -9,16 +9,16 @@ LABEL = re.compile(r"[A-Za-z0-9][A-Za-z0-9_-]*")
 
 
 def labelled(word: str) -> tuple[str, str]:
-    """The label and the name of an agent as it is asked for; without a label the name is it.
+    """The label and the name in the specification of an agent; the label defaults to the name.
 
-    A name may hold a "=" behind a colon: what it is then tells where to find it.
+    A name may contain a "=" after a colon, as part of a path or command.
     """
     label, equals, name = word.partition("=")
     return (label, name) if equals and ":" not in label else (word, word)
 
 
 def cast_of(words: Sequence[str]) -> dict[str, str]:
-    """The names of agents by their labels, in order; ValueError for labels that are none."""
+    """The names of agents by their labels, in order; ValueError for invalid labels."""
     cast: dict[str, str] = {}
     for word in words:
         label, name = labelled(word)

@@ -1,20 +1,22 @@
 """The networks that come with cavsumo, by name: ``crossing`` instead of a path.
 
-They lie in the package (``data/`` of a wheel) or, in a checkout, in ``networks/`` and ``routes/``
-beside it. Plans, manifests and traces hold the name and not the place, which differs from machine
-to machine. A file of that name goes before; a folder does not, since traces have folders.
+They are in the package (``data/`` of a wheel) or, in a checkout, in ``networks/`` and ``routes/``
+beside it. Plans, manifests and traces contain the name, not the path, which differs between
+machines. A file of that name takes precedence; a folder does not, since traces have folders.
 """
 
 from __future__ import annotations
 
 import importlib.resources
+import shlex
 from pathlib import Path
 
-from cavsumo.errors import UnknownName
+from cavsumo.errors import InputError, UnknownName
 
 DEFAULT = "crossing"
 ENDING = ".net.xml"
-ROUTES = Path("cavsumo/data/routes")  # stands for the folder of their demand, wherever it is
+OSM_ENDINGS = (".osm", ".osm.xml", ".osm.gz", ".osm.xml.gz", ".osm.bz2", ".pbf")
+ROUTES = Path("cavsumo/data/routes")  # stands for the folder of their demand
 
 
 def names() -> list[str]:
@@ -23,23 +25,30 @@ def names() -> list[str]:
 
 
 def is_named(net: Path) -> bool:
-    """Whether this is the name of a network, and no file."""
+    """Whether a word is the name of a network and not a file."""
     return not net.is_file() and str(net) in names()
 
 
 def network_file(net: Path) -> Path:
-    """The file of a network: of the one with that name, else the path as it is."""
+    """The file of the network with that name, or the path itself."""
     return _folder("networks") / f"{net}{ENDING}" if is_named(net) else net
 
 
 def check_network(net: Path, source: str = "") -> None:
-    """Raise UnknownName for a word that is no path and the name of no network."""
+    """Raise InputError for an unknown name of a network, and for OpenStreetMap data."""
+    if net.name.lower().endswith(OSM_ENDINGS):
+        target = net.name.split(".")[0] + ENDING
+        command = shlex.join(["cavsumo", "import-osm", str(net), "-o", target])
+        place = f"{source}: " if source else ""
+        raise InputError(
+            f"{place}{str(net)!r} is OpenStreetMap data; make a network of it: {command}"
+        )
     if is_word(net) and not net.exists() and not is_named(net):
         raise UnknownName("network", str(net), names(), source)
 
 
 def is_word(net: Path) -> bool:
-    """Whether this can be meant as a name: no folder before it, no ending after it."""
+    """Whether a path could be a name: it has neither a folder nor an ending."""
     return net.name == str(net) and bool(net.name) and not net.suffix
 
 
@@ -50,7 +59,7 @@ def routes_of(name: Path) -> Path | None:
 
 
 def routes_file(routes: Path) -> Path:
-    """The file of a demand: of a named network's, else the path as it is."""
+    """The file of the demand of a named network, or the path itself."""
     named = routes.parent == ROUTES and not routes.is_file()
     return _folder("routes") / routes.name if named else routes
 

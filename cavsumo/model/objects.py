@@ -18,6 +18,7 @@ import weakref
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from functools import cache, partial
+from operator import attrgetter
 from pathlib import Path
 from types import CodeType
 from typing import Any
@@ -36,11 +37,14 @@ class SentObject:
         name: ``object:NAME@DIGEST``.
         data: the object as bytes (pickle).
         builds: whether it is a class or a function, to be called for what is meant.
+        file: that of the module from which a worker imports its class or function; None when those
+            are among the bytes, or cavsumo's.
     """
 
     name: str
     data: bytes
     builds: bool
+    file: Path | None
 
     @property
     def label(self) -> str:
@@ -82,11 +86,11 @@ def sent(thing: Any) -> SentObject:
     label = re.sub(r"[^A-Za-z0-9_-]", "", _owner(thing).__name__)
     try:
         name = f"{PREFIX}{label}@{_digest(thing)}"
-        found = SentObject(name, cloudpickle.dumps(thing), builds=_owner(thing) is not type(thing))
+        data, builds = cloudpickle.dumps(thing), _owner(thing) is not type(thing)
     except Exception as error:  # anything that an object's own methods raise
         said = " ".join(f"{type(error).__name__}: {error}".split())
         raise InputError(f"object {label}: cannot be sent to a process: {said}") from error
-    return _KNOWN.setdefault(name, found)
+    return _KNOWN.setdefault(name, SentObject(name, data, builds, _imported_file(_owner(thing))))
 
 
 def objects_among(names: Iterable[str]) -> tuple[SentObject, ...]:
@@ -117,12 +121,7 @@ def is_instance(name: str) -> bool:
 
 def module_file(name: str) -> Path | None:
     """The file from which a worker imports the object's class or function, None for none."""
-    thing = pickle.loads(_known(name, name).data)
-    module = getattr(_owner(thing), "__module__", "")
-    if module == "__main__" or module.partition(".")[0] == __name__.partition(".")[0]:
-        return None
-    source = getattr(sys.modules.get(module), "__file__", None)
-    return None if source is None else Path(source)
+    return _known(name, name).file
 
 
 def _known(name: str, what: str) -> SentObject:
@@ -140,6 +139,20 @@ def _owner(thing: Any) -> Any:
     """The class or function that an object is, else its class."""
     plain = thing.func if isinstance(thing, partial) else thing
     return plain if isinstance(plain, type) or inspect.isroutine(plain) else type(thing)
+
+
+def _imported_file(owner: Any) -> Path | None:
+    """The file of a class or function that is imported by its name, elsewhere too."""
+    name = owner.__module__
+    module = sys.modules.get(name)
+    if module is None or name == "__main__" or name.startswith("cavsumo."):
+        return None
+    try:
+        found = attrgetter(owner.__qualname__)(module)
+    except AttributeError:  # it stands in a function
+        return None
+    source = getattr(module, "__file__", None)
+    return Path(source) if source is not None and found is owner else None
 
 
 def _digest(thing: Any) -> str:

@@ -1,9 +1,9 @@
-"""Who stands behind whom: which boxes an eye sees past the vehicles around it.
+"""Occlusion: the boxes that are visible from a point past the vehicles around it.
 
-The sight lines to a box lead from the eye to its centre and to its four corners. A line is cut by a
-box whose inside it passes through; grazing a side cuts nothing. A box is out of sight when each of
-its five lines is cut, by one vehicle or by several. So what shows less than a corner or its centre
-is out of sight, and a gap between two vehicles is seen through only where a line leads through it.
+The sight lines to a box lead from the eye to its centre and to its four corners. A box blocks a
+line that passes through its inside; a line that only touches a side is free. A box is hidden if
+each of its five lines is blocked, by one vehicle or by several. A box is therefore hidden if
+neither its centre nor a corner is visible, even if another part is.
 
 A line from e to e + d with the middle m = e + d / 2 passes through the inside of a box of half
 sides h, all in the frame of that box, if and only if none of the three axes separates them::
@@ -28,13 +28,13 @@ ACROSS = np.array((0.0, 1.0, 1.0, -1.0, -1.0))
 
 
 def in_sight(eye: Point, boxes: Sequence[Box], hiding: Sequence[bool]) -> list[bool]:
-    """Whether each of n boxes is seen from a point.
+    """Whether each of n boxes is visible from a point.
 
     Args:
-        eye: where from [m].
-        boxes: all that may be seen.
-        hiding: which of them hide others. A box does not hide itself, and one that contains the
-            eye hides nobody.
+        eye: the point [m].
+        boxes: the boxes.
+        hiding: which of them hide others. A box does not hide itself, and a box that contains the
+            eye hides no other.
     """
     if not any(hiding):
         return [True] * len(boxes)

@@ -1,9 +1,9 @@
 """The processes that a process of ours has started, directly or not, found and ended (Linux).
 
-A program may leave its parent: it forks twice, takes a session of its own, and belongs to nobody.
-Two things still tell whose it is. A process that adopts orphans becomes the parent of what its
-descendants leave behind; and everybody inherits the environment, in which TMPDIR names a folder
-that was made for one process.
+A program may leave its parent: it forks twice, starts its own session, and has no parent of ours.
+Two facts still identify it. A process that adopts orphans becomes the parent of the processes that
+its descendants leave behind; and each process inherits the environment, in which TMPDIR names a
+folder that was made for one process.
 """
 
 from __future__ import annotations
@@ -17,11 +17,11 @@ from pathlib import Path
 
 PR_SET_CHILD_SUBREAPER = 36  # Linux, prctl(2)
 PROC = Path("/proc")
-ROUNDS = 100  # in which what was killed may have started something else
+ROUNDS = 100  # in which a killed process may have started another
 
 
 def adopt_orphans() -> None:
-    """Become the parent of whatever the descendants of this process leave behind."""
+    """Become the parent of the processes that descendants of this process leave behind."""
     if sys.platform == "linux":
         import ctypes
 
@@ -29,17 +29,17 @@ def adopt_orphans() -> None:
 
 
 def kill_descendants(parent: int) -> None:
-    """Kill all descendants of a process, not the process, until none is left to be killed."""
+    """Kill all descendants of a process, but not the process itself, until there are none."""
     _kill_until_none(lambda: descendants(parent))
 
 
 def kill_those_with(tmpdir: str) -> None:
-    """Kill the processes whose environment names that temporary folder, but for this one."""
+    """Kill the processes whose environment names that temporary folder, except this one."""
     _kill_until_none(lambda: _with_environment(b"TMPDIR=" + os.fsencode(tmpdir)))
 
 
 def descendants(parent: int) -> list[int]:
-    """The descendants of a process; those that have ended and are not yet buried are none."""
+    """The descendants of a process, without those that have ended but are not yet reaped."""
     children: dict[int, list[int]] = {}
     alive = set()
     for pid, above, state in _processes():
@@ -55,18 +55,18 @@ def descendants(parent: int) -> list[int]:
 
 
 def _kill_until_none(find: Callable[[], Iterable[int]]) -> None:
-    """Kill what is found, and look again, because it may have started something meanwhile."""
+    """Kill the processes found, and look again, because they may have started others."""
     for _ in range(ROUNDS):
         killed = [pid for pid in find() if _killed(pid)]
         for pid in killed:
-            with contextlib.suppress(ChildProcessError):  # only those adopted are ours to bury
+            with contextlib.suppress(ChildProcessError):  # only the adopted ones are ours to reap
                 os.waitpid(pid, 0)
         if not killed:
             return
 
 
 def _killed(pid: int) -> bool:
-    """Kill a process; False for one that is gone, or not ours to kill."""
+    """Kill a process; False if it has ended or belongs to another user."""
     try:
         os.kill(pid, signal.SIGKILL)
     except (ProcessLookupError, PermissionError):

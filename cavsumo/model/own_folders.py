@@ -1,11 +1,11 @@
-"""Temporary folders of the processes that we start, in which those and their daemons are known.
+"""Temporary folders of the processes that we start, which identify those and their daemons.
 
-Each such process has the name of its folder in its environment (TMPDIR), and so has whatever it
-starts. When the folder is closed they are ended and it is removed.
+Each such process has the name of its folder in its environment (TMPDIR), and so have the processes
+that it starts. Closing the folder ends them and removes it.
 
-A parent that is killed cannot do that. So it holds a lock on the folder, which the system lets go
-when it dies, and whoever starts next closes the folders that nobody holds. A folder is marked once
-it is locked: one that is just being made, or another program's, is never taken for left behind.
+A parent that is killed cannot do that. It therefore holds a lock on the folder, which the system
+releases when it dies, and the next process closes the folders that are not locked. A folder is
+marked after it is locked, so that a folder in the making, or of another program, is never closed.
 """
 
 from __future__ import annotations
@@ -41,7 +41,7 @@ class OwnFolder:
         (Path(self.name) / MARK).write_text(f"{os.getpid()}\n", encoding="ascii")
 
     def close(self) -> None:
-        """End whoever has it as temporary folder, and remove it with all that is in it."""
+        """End the processes that have it as temporary folder, and remove it with its content."""
         sweep(Path(self.name))  # folders of a process that had it and died
         kill_those_with(self.name)
         shutil.rmtree(self.name, ignore_errors=True)
@@ -50,7 +50,7 @@ class OwnFolder:
 
 @cache
 def sweep_once() -> None:
-    """Close what killed owners have left behind, at the first call in this process."""
+    """Close the folders of killed owners, at the first call in this process."""
     sweep(Path(tempfile.gettempdir()))
 
 
@@ -62,7 +62,7 @@ def sweep(where: Path) -> None:
 
 
 def _sweep(folder: Path) -> None:
-    """Close one folder if it was locked and nobody holds it any more."""
+    """Close one folder if it was locked and is not locked any more."""
     if folder.lstat().st_uid != os.getuid() or not (folder / MARK).is_file():
         return
     lock = os.open(folder, os.O_RDONLY | os.O_DIRECTORY | os.O_NOFOLLOW)

@@ -1,4 +1,4 @@
-"""Things of the user's, named ``module:attribute``: importing them, and the files they stand in.
+"""Plugins of the user, named ``module:attribute``: importing them, and finding their files.
 
 Objects of the user's session have names too (``objects``), and are found by the same functions.
 """

@@ -1,4 +1,4 @@
-"""What every process needs that we start: an end with its parent, and words for how it ended."""
+"""Child processes: ending with their parent, and a text for how a process ended."""
 
 from __future__ import annotations
 
@@ -14,10 +14,10 @@ PR_SET_PDEATHSIG = 1  # Linux, prctl(2)
 OUTER_PATH = "CAVSUMO_OUTER_PYTHONPATH"  # what PYTHONPATH was before it was set for our own
 
 
-def leash(parent: int) -> Callable[[], None]:
-    """What a new process calls so that Linux kills it when its parent dies.
+def end_with_parent(parent: int) -> Callable[[], None]:
+    """A function for a new process to call, so that Linux kills it when its parent dies.
 
-    It is made before the process is, so that nothing has to be loaded between fork and exec.
+    It is made before the process, so that no library is loaded between fork and exec.
     """
     bind: Callable[[], object] = int
     if sys.platform == "linux":
@@ -38,10 +38,10 @@ _LASTING: dict[int, ThreadPoolExecutor] = {}  # by process, because a fork has n
 
 
 def by_a_lasting_thread(start: Callable[[], Started]) -> Started:
-    """Have something started by a thread that ends with this process.
+    """Start a process from a thread that ends only with this process.
 
-    What Linux calls the death of a parent is that of the thread which started the child (prctl(2),
-    PR_SET_PDEATHSIG), and the threads of an executor end before what they started is closed.
+    For Linux a parent dies when the thread ends that started the child (prctl(2),
+    PR_SET_PDEATHSIG), and the threads of an executor end before the processes that they started.
     """
     executor = _LASTING.setdefault(os.getpid(), ThreadPoolExecutor(1, "cavsumo-start"))
     return executor.submit(start).result()
@@ -56,13 +56,13 @@ def ending(code: int) -> str:
 
 
 def inner_environment() -> dict[str, str]:
-    """The environment of a process of ours, which finds the modules that this one finds."""
+    """The environment of a process of cavsumo that finds the modules that this one finds."""
     outer = os.environ.get("PYTHONPATH", "")
     return {**os.environ, "PYTHONPATH": os.pathsep.join(sys.path), OUTER_PATH: outer}
 
 
 def outer_environment() -> dict[str, str]:
-    """The environment without what was added to find our own modules in a process of ours."""
+    """The environment without the entries that ``inner_environment`` has added."""
     environment = dict(os.environ)
     outer = environment.pop(OUTER_PATH, None)
     if outer is not None:

@@ -15,7 +15,7 @@ T = TypeVar("T")
 
 @dataclass(frozen=True)
 class Parameter:
-    """One parameter of a registered thing, as the listings show it."""
+    """One parameter of a registered class, as the listings show it."""
 
     name: str
     default: Any
@@ -39,7 +39,7 @@ class Registry(Generic[T]):
         self._entries: dict[str, Callable[..., T]] = {}
 
     def register(self, name: str) -> Callable[[Callable[..., T]], Callable[..., T]]:
-        """Decorator that files a class under a name; a name is given once."""
+        """Decorator that registers a class under a name; each name is used once."""
 
         def file(entry: Callable[..., T]) -> Callable[..., T]:
             if name in self._entries:
@@ -57,7 +57,7 @@ class Registry(Generic[T]):
         return iter(self.names)
 
     def get(self, name: str) -> Callable[..., T]:
-        """The class filed under a name, or UnknownName with the nearest one."""
+        """The class registered under a name, or UnknownName with the nearest one."""
         if name not in self._entries:
             self.names.check(name)
             self.names.load(name)

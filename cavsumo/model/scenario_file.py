@@ -1,4 +1,4 @@
-"""Scenario files (TOML): the settings that stand in them, with their paths resolved."""
+"""Scenario files (TOML): their settings, with paths resolved."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ def read_config(file: Path) -> dict[str, Any]:
 
 
 def read_toml(file: Path) -> dict[str, Any]:
-    """What a scenario file holds, unchecked."""
+    """The content of a scenario file, unchecked."""
     try:
         return tomllib.loads(file.read_text(encoding="utf-8"))
     except OSError as error:
@@ -41,7 +41,7 @@ def settings_in(data: Mapping[str, Any], file: Path, place: str = "") -> dict[st
 
 
 def _resolved(key: str, value: Any, folder: Path) -> Any:
-    """A path of a scenario file, relative to that file, as SUMO has it in its own."""
+    """A path of a scenario file, which is relative to that file, as in SUMO's own files."""
     if key == "agents" and isinstance(value, list):
         return [_resolved_agent(name, folder) for name in value]
     if key not in PATH_KEYS or value == "none":
@@ -57,7 +57,7 @@ def _resolved(key: str, value: Any, folder: Path) -> Any:
 
 
 def _resolved_agent(word: Any, folder: Path) -> Any:
-    """An agent of a scenario file; the file of a policy is a path like others."""
+    """An agent of a scenario file; the file of a policy is a path like any other."""
     label, name = labelled(str(word))
     prefix, _, file = name.partition(":")
     if prefix != "policy" or not file:

@@ -1,4 +1,4 @@
-"""What does not change during an episode: everybody who decides is told at its beginning."""
+"""The constant part of an episode, which agents and the ego receive at its beginning."""
 
 from __future__ import annotations
 
@@ -16,21 +16,21 @@ from cavsumo.model.snapshot import Snapshot
 
 @dataclass(frozen=True)
 class Scene:
-    """What does not change during an episode.
+    """The constant part of an episode.
 
     Attributes:
         dt: length of a timestep, the seed's lambda [s].
         ego: the vehicle under test.
-        ego_path: where it means to drive.
+        ego_path: the planned path of the ego.
         bodies: the testers' bodies, in the order of ``Snapshot.testers``.
         starts: where each of them starts.
-        roads: carriageways and the ways across them; None on an open plane.
+        roads: carriageways and the ways across them; None for an open plane.
         lights: the traffic lights on the ego's path, in the order in which it meets them.
         crossings: the marked pedestrian crossings on the ego's path, likewise.
         limits: the speed limits on the ego's path, likewise.
-        ground: all that one can walk or drive on near the ego's path; None where it is not told.
-        horizon: how long the episode may last [s]; infinite where nobody said.
-        seed: of the episode; whoever draws random numbers without a generator starts from it.
+        ground: the areas for walking or driving near the ego's path; None if unknown.
+        horizon: longest duration of the episode [s]; infinite if not limited.
+        seed: of the episode, for code that draws random numbers without a given generator.
     """
 
     dt: float
@@ -57,11 +57,11 @@ class Scene:
         return self._ways[index]
 
     def ego_progress(self, snapshot: Snapshot) -> float:
-        """How far the ego's centre is along its path [m]; computed once for each snapshot."""
+        """Arc length of the ego's centre on its path [m]; computed once for each snapshot."""
         return self.ego_projection(snapshot).along
 
     def ego_projection(self, snapshot: Snapshot) -> Projection:
-        """Where the ego's centre is relative to its path; computed once for each snapshot."""
+        """Position of the ego's centre relative to its path; computed once for each snapshot."""
         if snapshot.unseen is not None:
             return self._glimpsed(snapshot)
         last, here = self._progress
@@ -76,7 +76,7 @@ class Scene:
         return found
 
     def _glimpsed(self, snapshot: Snapshot) -> Projection:
-        """As a tester's sensor shows it: the ego may be anywhere next, so it is not followed."""
+        """The projection in a sensor's view: the ego may jump between views, so no hint is used."""
         if self._glimpse[0] is not snapshot:
             ego = snapshot.ego
             self._glimpse[:] = snapshot, self.ego_path.project(ego.x, ego.y)

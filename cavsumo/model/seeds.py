@@ -12,5 +12,5 @@ def episode_seed(batch_seed: int, episode: int) -> int:
 
 
 def starts_generator(seed: int) -> np.random.Generator:
-    """Draws the testers' starts of the episode with that seed: the first of its generators."""
+    """The generator of an episode's starts, the first of those from its seed."""
     return np.random.default_rng(np.random.SeedSequence(seed).spawn(1)[0])

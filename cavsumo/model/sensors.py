@@ -1,16 +1,16 @@
-"""The sensor model: what an observer sees of the truth, when the seed's full observability is off.
+"""The sensor model: the view of an observer, if observability is not full.
 
-An observer is the ego, or a tester agent with all its bodies. It knows itself exactly and at once.
-Of everybody else it has *measurements*. The one of a timestep holds
+An observer is the ego, or a tester agent with all its bodies. It knows its own state exactly and
+without delay. It has *measurements* of the other bodies. The measurement of a timestep holds
 
-* who is within ``range_m`` of one of its eyes, the centres of its own bodies, centre to centre, and
-  is seen from that eye past the vehicles of others (``occlusion``), if ``occlusion`` is on;
+* the bodies within ``range_m`` of one of its eyes, the centres of its own bodies, centre to centre,
+  and visible from that eye past the vehicles of others, if ``occlusion`` is on;
 * for each of them x + N(0, position_noise_m), y + N(0, position_noise_m), v + N(0, speed_noise_mps)
   and o + N(0, heading_noise_rad): independent of each other, of the body and of the timestep. A
   speed that is not negative stays so, orientations are wrapped;
-* the traffic lights whose stop lines are within ``range_m``: nothing hides them, none is mistaken.
+* the traffic lights whose stop lines are within ``range_m``, without occlusion and errors.
 
-At the time t the observer is given the measurement of t - ``delay_s``, rounded to timesteps; at
+At the time t the observer receives the measurement of t - ``delay_s``, rounded to timesteps; at
 the start of an episode, when there is none so old, the first.
 """
 
@@ -35,7 +35,7 @@ SEEN_PAST = (PEDESTRIAN.name, BICYCLE.name)  # kinds that hide nobody
 
 
 class Measurement(NamedTuple):
-    """What a sensor says of one timestep; None for a body that it does not see."""
+    """The measurement of one timestep; None for a body that the sensor does not see."""
 
     ego: BodyState | None
     steering: float
@@ -70,7 +70,7 @@ class Observer:
         ]
 
     def view(self, snapshot: Snapshot) -> Snapshot:
-        """What the observer is shown; called once for each timestep, in their order."""
+        """The view of the observer; called once for each timestep, in their order."""
         self._past.append(self._measure(snapshot))
         seen = self._past[0]
         if self._own is not None:
@@ -84,7 +84,7 @@ class Observer:
         )
 
     def _remembered(self, snapshot: Snapshot, seen: Measurement) -> Snapshot:
-        """A tester agent's view: who is unseen is where it was last seen, and is named."""
+        """A tester agent's view: unseen bodies have their last seen states, and are named."""
         own, unseen = self._own or (), []
         if seen.ego is None:
             unseen.append(self._ego.id)
@@ -108,7 +108,7 @@ class Observer:
         )
 
     def _measure(self, snapshot: Snapshot) -> Measurement:
-        """What the sensor says of this timestep."""
+        """The measurement of this timestep."""
         (_, _, ego, steering, testers, background, *_), own = snapshot, self._own
         mine = [ego] if own is None else [testers[i] for i in own]
         eyes = [(state.x, state.y) for state in mine]
@@ -126,7 +126,7 @@ class Observer:
         )
 
     def _look(self, eyes: Sequence[Point], others: Sequence[RawState]) -> Iterator[RawState]:
-        """Those of the others who are seen, as measured."""
+        """The measured states of the visible others."""
         seen = self._seen(eyes, others)
         if self._noise is None:
             yield from (other for other, known in zip(others, seen, strict=True) if known)
@@ -149,7 +149,7 @@ class Observer:
         return seen
 
     def _hidden(self, eye: Point, others: Sequence[RawState], away: Sequence[float]) -> set[int]:
-        """Who is out of sight from an eye, of those in range."""
+        """The bodies in range that are hidden from an eye."""
         # Who hides a body in range is no farther than its reach and their own beyond the range.
         beyond = 2.0 * max((other[0].kind.reach for other in others), default=0.0)
         near = [i for i, distance in enumerate(away) if distance <= self._range + beyond]
@@ -191,12 +191,12 @@ class Senses:
         ]
 
     def views(self, snapshot: Snapshot) -> tuple[Snapshot, tuple[Snapshot, ...]]:
-        """What the ego and each agent are shown; called once for each timestep, in their order."""
+        """The views of the ego and of each agent; called once for each timestep, in their order."""
         ego = snapshot if self._ego is None else self._ego.view(snapshot)
         return ego, tuple([snapshot if a is None else a.view(snapshot) for a in self._agents])
 
 
 def _shifted(state: RawState, dx: float, dy: float, dv: float, do: float) -> RawState:
-    """A state with errors added; who does not drive backwards does not seem to."""
+    """A state with errors added; a speed that is not negative stays so."""
     body, x, y, v, o = state
     return body, x + dx, y + dy, max(min(v, 0.0), v + dv), wrap(o + do)

@@ -1,7 +1,7 @@
-"""What everybody sees at one timestep: immutable, complete, cheap to make.
+"""The state of the simulation at one timestep: immutable, complete, cheap to make.
 
-Background bodies are kept as the plain tuples that the world read and become records only when
-somebody asks for them, because most agents never do.
+Background bodies are plain tuples as read by the world, and become records only on request, because
+most agents never need them.
 """
 
 from __future__ import annotations
@@ -48,14 +48,16 @@ class Snapshot(NamedTuple):
         ego_steering: its steering angle in the last timestep [rad]; for an ego that SUMO moves,
             the angle that its turn implies (seed, eq. 22).
         testers: the tester's bodies, in the order of the scenario.
-        raw_background: everybody else, as plain tuples in the field order of BodyState. When no
-            ego, agent or assertion of the episode ``sees_background`` and nothing is recorded,
-            those are left out who are not within AROUND_M of the ego or a tester (``background``).
-        lights: what each of ``Scene.lights`` shows the ego, as SUMO's letter (G and g are green, y
-            is yellow, r is red).
-        unseen: ids of the ego and of testers whom a tester agent does not see through its sensor
-            (``sensors``): they are shown where it last saw them. None without such a sensor.
-        crossing_lights: what each of ``Scene.crossings`` shows who walks over it, empty for one
+        raw_background: all other bodies, as plain tuples in the field order of BodyState. If no
+            ego, agent or assertion of the episode ``sees_background`` and the episode is not
+            recorded, bodies farther than AROUND_M from the ego and all testers are left out
+            (``background``).
+        lights: state of each of ``Scene.lights`` for the ego, as SUMO's letter (G and g are green,
+            y is yellow, r is red).
+        unseen: ids of the ego and of testers that a tester agent does not see through its sensor
+            (``sensors``); they have the state in which it last saw them. None without such a
+            sensor.
+        crossing_lights: state of each of ``Scene.crossings`` for pedestrians, empty for a crossing
             without lights. Sensors leave it out.
     """
 
@@ -76,5 +78,5 @@ class Snapshot(NamedTuple):
 
     @property
     def background(self) -> tuple[BodyState, ...]:
-        """Everybody in ``raw_background``, as records (made anew at each call)."""
+        """The bodies of ``raw_background``, as records (made anew at each call)."""
         return tuple(BodyState(*raw) for raw in self.raw_background)

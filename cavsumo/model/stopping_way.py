@@ -1,4 +1,4 @@
-"""The room that a body on foot needs ahead of it: as far as it still goes when it stops at once."""
+"""The space that a pedestrian needs ahead of it to stop at once."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from cavsumo.model.geometry import Box, overlap
 
 
 def stopping_way(kind: Kind, v: float, dt: float) -> float:
-    """How far a body goes that brakes as hard as it can [m]; no less than v^2 / (2 b) + v dt / 2.
+    """Stopping distance of a body at full braking [m]; at least v^2 / (2 b) + v dt / 2.
 
     The position follows one timestep behind the throttle, so a whole timestep is added.
     """
@@ -18,7 +18,7 @@ def stopping_way(kind: Kind, v: float, dt: float) -> float:
 
 
 def stretched(box: Box, way: float) -> Box:
-    """All that a box passes over on its way straight on [m]."""
+    """The area that a box covers while it moves straight on [m]."""
     x, y, o, length, width = box
     half = way / 2
     return Box(x + half * math.cos(o), y + half * math.sin(o), o, length + way, width)

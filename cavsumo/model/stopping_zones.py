@@ -4,9 +4,9 @@ Lengths in metres, angles in radians anticlockwise from east. Plain floats only,
 of the simulation; NaN in a box is not checked for.
 
 A strip as wide as the ego starts at its front bumper. Its first d_b = v^2 / (2 max_decel) metres
-are the braking zone: not even an immediate full brake spares what stands there. The next
-d_r = reaction_time * v metres are the reaction zone: an immediate brake spares what stands there,
-one that comes after the reaction time does not.
+are the braking zone: even immediate full braking does not avoid a body that stands there. The next
+    d_r = reaction_time * v metres are the reaction zone: immediate full braking avoids a body that
+    stands there, braking after the reaction time does not.
 
 While the ego steers, the strip follows the circle on which the centre F of the front bumper moves
 about the centre of rotation (eqs 12-13 of the seed, the draft paper "Simulator-Based Verification

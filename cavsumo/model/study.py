@@ -9,8 +9,8 @@
         { name = "crossing", net = "crossing.net.xml" },
     ]
 
-An entry is a list: of values of the setting that it is called after, or of tables of settings, each
-with a name. The batches are those of all combinations, the last entry changing fastest.
+An entry is a list of values of the setting after which it is named, or a list of tables of
+settings, each with a name. There is a batch for each combination, the last entry changing fastest.
 """
 
 from __future__ import annotations
@@ -40,9 +40,9 @@ class Part:
     """One batch of a study.
 
     Attributes:
-        name: of the combination; empty for a batch that is no part of a study.
+        name: of the combination; empty for a batch outside of a study.
         settings: all of the batch, flat.
-        defaults: of settings that neither these nor results that are gone on with have.
+        defaults: of settings that neither ``settings`` nor resumed results define.
     """
 
     name: str
@@ -63,7 +63,7 @@ class Choice:
 
 
 def read_study(file: Path, given: Mapping[str, Any]) -> list[Part]:
-    """The batches of a scenario file, each overruled by the settings that are given."""
+    """The batches of a scenario file, each with the given settings in place of its own."""
     data = read_toml(file)
     varied = data.pop(VARY, None)
     settings = settings_in(data, file)
@@ -86,8 +86,23 @@ def read_study(file: Path, given: Mapping[str, Any]) -> list[Part]:
         raise InputError(f"config {str(file)!r}: {VARY}: {error}") from error
 
 
+def at_each(parts: Sequence[Part], nets: Sequence[str]) -> list[Part]:
+    """Each batch on each of several networks, called by the network first."""
+    names = [Path(net).name.split(".")[0] for net in nets]
+    for name, net in zip(names, nets, strict=True):
+        if names.count(name) > 1:
+            raise InputError(f"--net {net}: another network is called {name!r} as well")
+    if len(parts) * len(nets) > MOST:
+        raise InputError(f"--net: {len(parts) * len(nets)} batches, at most {MOST} are played")
+    return [
+        Part(f"{name}-{part.name}" if part.name else name, {**part.settings, "net": net})
+        for name, net in zip(names, nets, strict=True)
+        for part in parts
+    ]
+
+
 def choices_in(varied: Any, file: Path) -> dict[str, list[Choice]]:
-    """The entries of a table ``[vary]``; raises InputError for what is none."""
+    """The entries of a table ``[vary]``; raises InputError for anything else."""
     if not (isinstance(varied, dict) and varied):
         raise InputError(f"config {str(file)!r}: {VARY}: expected a table of lists")
     choices: dict[str, list[Choice]] = {}
@@ -105,7 +120,7 @@ def choices_in(varied: Any, file: Path) -> dict[str, list[Choice]]:
 
 
 def product(settings: Mapping[str, Any], choices: Sequence[Sequence[Choice]]) -> list[Part]:
-    """All combinations, the last entry changing fastest; ValueError where names do not differ."""
+    """All combinations, the last entry changing fastest; ValueError if two names are equal."""
     count = math.prod(map(len, choices))
     if count > MOST:
         raise ValueError(f"{count} batches, at most {MOST} are played as one study")
@@ -156,7 +171,7 @@ def _choice(key: str, option: Any, file: Path, place: str) -> Choice:
 
 
 def part_name(key: str, value: bool | int | float | str) -> str:
-    """What a batch with this value is called: ``testers3``, ``signal-red``."""
+    """The name of a batch with this value: ``testers3``, ``signal-red``."""
     text = str(value).lower() if isinstance(value, bool) else str(value)
     if key in PATH_KEYS:
         text = Path(text).name.split(".")[0]

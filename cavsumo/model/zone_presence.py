@@ -1,8 +1,9 @@
-"""How a tester vehicle counts in the stopping zones, where a standing body counts as it stands.
+"""The position at which a tester vehicle counts in the stopping zones.
 
-The zones say what an ego that brakes at once, or after its reaction time, would still touch; that
-is a question of where a body *will be*. Someone on foot is taken to be where it is, as CAV-Gym
-does. A vehicle is not, or whoever drives ahead at an ordinary distance would be in the zones.
+The zones contain the places that an ego would still touch if it braked at once, or after its
+reaction time; so they concern the position that a body *will have*. A pedestrian counts at its
+current position, as in CAV-Gym. A vehicle does not, because otherwise a leader at an ordinary
+distance would be in the zones.
 """
 
 from __future__ import annotations
@@ -19,17 +20,17 @@ BUMPER_M = 0.3  # depth of the ego's front, to which the way of a timestep is ad
 
 
 def is_vehicle(body: BodyState) -> bool:
-    """Whether a body counts as this module says."""
+    """Whether a body counts as described in this module."""
     return body.body.kind.name not in WALKING
 
 
 def drift(onward: float, v: float, max_decel: float) -> float:
-    """How much farther ahead of the ego a vehicle counts than where it is [m].
+    """Distance ahead of its current position at which a vehicle counts [m].
 
-    Both brake: who drives ahead at the speed ``onward`` still makes onward^2 / (2 max_decel), as
-    in RSS (Shalev-Shwartz et al., arXiv:1708.06374, definition 1, without a response time). Who
-    comes towards the ego (onward < 0) keeps its speed for the v / max_decel seconds that the ego
-    takes to stand.
+    Both brake: a leader at the speed ``onward`` still drives onward^2 / (2 max_decel), as in RSS
+        (Shalev-Shwartz et al., arXiv:1708.06374, definition 1, without a response time). An
+        oncoming vehicle (onward < 0) keeps its speed for the v / max_decel seconds that the ego
+        needs to stop.
     """
     if onward > 0.0:
         return 0.5 * onward * onward / max_decel
@@ -46,8 +47,8 @@ def counted(body: BodyState, ego: BodyState, max_decel: float) -> Box:
 def out_of_the_way(body: BodyState, ego: BodyState, path: Path) -> bool:
     """Whether an ego that keeps to its path passes a vehicle where it is.
 
-    While the ego turns, its zones sweep over lanes that its path does not; who waits or drives
-    there is no test.
+    While the ego turns, its zones cover lanes that its path does not touch; a vehicle that waits or
+    drives there is no test.
     """
     if abs(path.project(ego.x, ego.y).lateral) > ON_PATH_M:
         return False
@@ -57,7 +58,7 @@ def out_of_the_way(body: BodyState, ego: BodyState, path: Path) -> bool:
 
 
 def ran_into(body: BodyState, ego: BodyState, dt: float) -> bool:
-    """Whether a vehicle that touches the ego touches its sides or rear only, not its front."""
+    """Whether a vehicle that touches the ego touches only its sides or rear, not its front."""
     length, width = ego.body.kind.length, ego.body.kind.width
     depth = BUMPER_M + ego.v * dt
     ahead = (length - depth) / 2 + BUMPER_M / 2
@@ -68,5 +69,5 @@ def ran_into(body: BodyState, ego: BodyState, dt: float) -> bool:
 
 
 def drives_clear(body: BodyState, ego: BodyState) -> bool:
-    """Whether a vehicle drives ahead no slower than the ego."""
+    """Whether a vehicle drives ahead at least as fast as the ego."""
     return ego.v > 0.0 and body.v * math.cos(body.o - ego.o) >= ego.v

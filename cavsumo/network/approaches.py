@@ -1,7 +1,7 @@
 """The ways on which vehicles can meet the ego: across its path, into it, ahead of it, beside it.
 
-Whether two ways conflict is asked of their shapes and not of the network's tables of foes: those
-know neither how wide the bodies are nor that the lanes of one road are different ones.
+Conflicts of two ways are found from their shapes and not from the network's tables of foes, which
+contain neither the widths of bodies nor the separate lanes of a road.
 """
 
 from __future__ import annotations
@@ -31,17 +31,17 @@ from cavsumo.network.reader import (
 )
 
 UPSTREAM_M = 100.0  # how far before the stop line an approach begins, where the roads allow it
-ONWARD_M = 120.0  # how far a vehicle drives on behind the junction
-BEYOND_M = 60.0  # how far a vehicle on the ego's lane drives on behind the end of the ego's way
-SEARCH_M = 25.0  # a way that meets the ego's this far behind the junction only is no conflict
+ONWARD_M = 120.0  # how far a vehicle drives on after the junction
+BEYOND_M = 60.0  # how far a vehicle on the ego's lane drives on after the end of the ego's way
+SEARCH_M = 25.0  # a way that first meets the ego's this far after the junction is no conflict
 STEP_M = 0.5  # resolution at which a way is compared with the ego's
-GRAZING_M = 3.0  # ways that touch for less only graze each other
+GRAZING_M = 3.0  # a shorter contact of two ways does not count
 CLEAR_M = 0.5  # distance kept to the stop line and to the ego's strip while waiting
 BESIDE_M = (2.0, 5.0)  # distance between the axes of lanes that lie side by side
 PARALLEL_RAD = 0.3
-SHARED_M = 30.0  # lanes that lie side by side for less are no use for cutting in
+SHARED_M = 30.0  # shorter parallel lanes are too short for cutting in
 OWN_M = 1.0  # a lane whose middle lies this close to the ego's path is the ego's own
-TOO_SHARP = 1.1  # room left between the tightest bend of a way and what a body can turn
+TOO_SHARP = 1.1  # margin between the tightest bend of a way and the turn of which a body is capable
 
 
 def approaches(
@@ -50,7 +50,7 @@ def approaches(
     """All ways on which a body of that kind can meet an ego on its route, ties by id.
 
     ``wanted`` are the types to keep, all if it is empty. The junction under test comes first: other
-    junctions on the ego's route are looked at only when nothing crosses or merges there. Raises
+    junctions on the ego's route are searched only if no way crosses or merges there. Raises
     NetworkError when there is none.
     """
     edges = [network.edge(i) for i in route.edges]
@@ -154,7 +154,7 @@ class _Search:
         )
 
     def _span(self, path: Path, begin: float, end: float) -> tuple[float, float] | None:
-        """Between which arc lengths a body on a path touches the ego's strip first."""
+        """The first interval of arc lengths in which a body on a path touches the ego's strip."""
         count = max(1, math.ceil((end - begin) / STEP_M))
         marks = [begin + (end - begin) * i / count for i in range(count + 1)]
         touching = [self.strip.intersects(Polygon(corners(self._box(path, s)))) for s in marks]
@@ -165,7 +165,7 @@ class _Search:
         return marks[max(0, first - 1)], marks[last]
 
     def _touched(self, path: Path, enter: float) -> float:
-        """Where on its path the ego would touch a body that has just entered its strip."""
+        """Arc length at which the ego would touch a body that has just entered its strip."""
         body = Polygon(corners(self._box(path, enter + STEP_M)))
         part = self.strip.intersection(body)
         points = shapely.get_coordinates(part if not part.is_empty else body)
@@ -181,7 +181,7 @@ class _Search:
         return max(path.curvature(float(s)) for s in marks) * radius * TOO_SHARP < 1.0
 
     def _own(self, edges: Sequence[Any]) -> Path | None:
-        """The ego's path and on along the lane in which it ends."""
+        """The ego's path, continued along the lane in which it ends."""
         own = [lane for lane in driving_lanes(edges[-1]) if self._is_own(lane)]
         if not own:
             return None

@@ -1,4 +1,4 @@
-"""The ego's way through a network: given, or derived through the junction best worth testing."""
+"""The ego's route through a network: given, or derived through the most suitable junction."""
 
 from __future__ import annotations
 
@@ -20,8 +20,8 @@ from cavsumo.network.reader import (
 )
 
 APPROACH_M = 80.0  # how far before the junction the ego starts, where the roads allow it
-EXIT_M = 50.0  # how far behind the junction it is followed
-HEADING_M = 5.0  # stretch before and behind a junction that tells which way a movement turns
+EXIT_M = 50.0  # how far after the junction it is followed
+HEADING_M = 5.0  # stretch before and after a junction that determines the turn of a movement
 STRAIGHT, BACK = "s", "tT"  # SUMO's connection directions
 TURNS = ("straight", "left", "right", "u-turn")
 YIELDING = "m=sw"  # SUMO's link states without right of way
@@ -29,13 +29,13 @@ YIELDING = "m=sw"  # SUMO's link states without right of way
 
 @dataclass(frozen=True, slots=True)
 class EgoRoute:
-    """Where the ego drives.
+    """The route of the ego.
 
     Attributes:
         edges: ids of its edges.
         lane: index of the lane on which it starts.
-        depart_m: where its front bumper starts, from the beginning of the first edge [m].
-        arrive_m: where it leaves the simulation, from the beginning of the last edge [m].
+        depart_m: start position of its front bumper on the first edge [m].
+        arrive_m: position on the last edge at which it leaves the simulation [m].
         path: its centre line from where the ego's centre starts to where its front arrives.
         junction: id of the junction under test, None when there is none or the route was given.
     """
@@ -58,7 +58,7 @@ def given_route(network: Network, edge_ids: Sequence[str], half_m: float) -> Ego
 
 
 def derived_routes(network: Network, junction_id: str | None, half_m: float) -> Iterator[EgoRoute]:
-    """The routes worth testing, the best first; raises NetworkError when there is none.
+    """The routes suited to tests, the best first; raises NetworkError when there is none.
 
     A network without a junction to drive through gives its longest edge with a pavement.
     """
@@ -74,7 +74,7 @@ def derived_routes(network: Network, junction_id: str | None, half_m: float) -> 
 
 
 def turn_meant(network: Network, words: Sequence[str]) -> str | None:
-    """The turn that an ego's route of one word means; None for edges, which go before turns."""
+    """The turn that a route of one word names; None for edges, which take precedence."""
     if len(words) != 1 or any(words[0] == e.getID() for e in network.edges):
         return None
     if words[0] not in TURNS:
@@ -113,8 +113,8 @@ def ranked_routes(
 ) -> Iterator[tuple[Movement, EgoRoute]]:
     """The ways through a junction, or through all, with their routes, the best first.
 
-    Where roads are drawn over each other, netconvert makes lanes that lead back to the mouth of
-    the next one; routes along such a zigzag come last.
+    Where roads overlap on the map, netconvert makes lanes that lead back to the beginning of the
+    next one; routes along such a zigzag come last.
     """
     zigzags: list[tuple[Movement, EgoRoute]] = []
     for movement in ranked_movements(network, junction_id):
@@ -159,7 +159,7 @@ class Movement:
 
     @property
     def turn(self) -> str:
-        """Which way it goes, by its geometry: straight is within 45 degrees of straight on.
+        """The turn by its geometry: straight is within 45 degrees of straight on.
 
         U-turns are SUMO's, because a road may return beside itself by any angle.
         """
@@ -190,7 +190,7 @@ def movements(node: Any) -> list[Movement]:
 
 
 def _worth(movement: Movement, crossed: set[str]) -> tuple[Any, ...]:
-    """Sort key: the best movement to test first."""
+    """Sort key that puts the movement most suited to tests first."""
     into, out = movement.into, movement.out
     before = _upstream(into)
     approach = math.fsum(e.getLength() for e in before)

@@ -1,4 +1,4 @@
-"""A network in figures: its lanes, crossings, traffic lights, where it lies, what it lacks."""
+"""Figures of a network: lanes, crossings, traffic lights, location, missing features."""
 
 from __future__ import annotations
 
@@ -11,8 +11,8 @@ from typing import Any
 
 from cavsumo.network.reader import Network, driving_lanes, is_pavement
 
-NET_VERSIONS = ((1, 0), (1, 20))  # of SUMO's network format, that cavsumo was made for
-# What gives pedestrians their turn on a crossing.
+NET_VERSIONS = ((1, 0), (1, 20))  # versions of SUMO's network format for which cavsumo was made
+# The right of way of pedestrians on a crossing.
 SIGNALS, PRIORITY, NONE = "signals", "priority", "none"
 
 
@@ -32,7 +32,7 @@ class Facts:
         components: parts that no road connects.
         width_m, height_m: extent [m].
         centre: latitude and longitude of the middle [degrees], None when not known.
-        notes: what a user should know, sentences.
+        notes: sentences about missing features, for the user.
     """
 
     format: str
@@ -88,7 +88,7 @@ def facts(network: Network) -> Facts:
 
 
 def right_of_way(crossing: Any) -> str:
-    """What gives pedestrians their turn on a crossing: signals, priority over cars or nothing."""
+    """The right of way of pedestrians on a crossing: by signals, by priority over cars or none."""
     links = [link for links in crossing.getIncoming().values() for link in links]
     if any(link.getTLSID() for link in links):
         return SIGNALS
@@ -107,12 +107,12 @@ def place(network: Network, x: float, y: float) -> tuple[float, float] | None:
 
 
 def has_georeference(network: Network) -> bool:
-    """Whether a network says where on earth it lies."""
+    """Whether a network has a georeference."""
     return str(network.net._location.get("projParameter", "!")) not in ("!", "-", "", ".")
 
 
 def _neighbours(network: Network) -> dict[str, set[str]]:
-    """The junctions that roads connect with each junction, whatever their direction."""
+    """The junctions that roads connect with each junction, in either direction."""
     found: dict[str, set[str]] = {}
     for edge in network.edges:
         a, b = str(edge.getFromNode().getID()), str(edge.getToNode().getID())
@@ -136,7 +136,7 @@ def _components(neighbours: Mapping[str, set[str]]) -> int:
 
 
 def _notes(network: Network, found: Facts) -> Iterator[str]:
-    """What a user should know about a network."""
+    """Sentences about the missing features of a network."""
     first, last = (".".join(map(str, version)) for version in NET_VERSIONS)
     if not NET_VERSIONS[0] <= _version(found.format) <= NET_VERSIONS[1]:
         yield (

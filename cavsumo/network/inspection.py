@@ -1,4 +1,4 @@
-"""The junctions of a network that are worth testing, and the ways through them, as records."""
+"""The junctions of a network that are suited to tests, and the ways through them, as records."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ class Way:
         turn: straight, left, right or u-turn.
         into, out: ids of the edges that meet at the junction.
         streets: their names, as far as they have any.
-        route: where the ego drives.
+        route: the ego's route.
         crossings: ids of the pedestrian crossings that its path leads over.
         areas: where testers may start.
     """
@@ -76,7 +76,7 @@ class Junction:
 
 @dataclass(frozen=True)
 class InspectedNetwork:
-    """What every look at a junction needs.
+    """The data that the inspection of every junction needs.
 
     Attributes:
         network: with its junctions.
@@ -101,7 +101,7 @@ class InspectedNetwork:
 
 
 def ground(network: Network, half_m: float) -> InspectedNetwork:
-    """Prepare a network for a look at its junctions; ValueError for lanes without a shape."""
+    """Prepare a network for the inspection of junctions; ValueError for lanes without a shape."""
     lanes = [(str(edge.getID()), edge.getLanes()[0]) for edge in network.crossings()]
     lines = shapely.STRtree([LineString(lane_shape(lane)) for _, lane in lanes])
     return InspectedNetwork(
@@ -110,7 +110,7 @@ def ground(network: Network, half_m: float) -> InspectedNetwork:
 
 
 def best_junctions(here: InspectedNetwork, top: int) -> list[Junction]:
-    """The junctions best worth testing, those where testers can meet the ego before the others.
+    """The junctions most suited to tests; those where testers can meet the ego come first.
 
     The first is the one that ``cavsumo run`` chooses. Of the pieces of one intersection only the
     best is there.
@@ -156,7 +156,7 @@ def junction(here: InspectedNetwork, node: Any) -> Junction:
 
 
 def _way(here: InspectedNetwork, movement: Movement, route: EgoRoute) -> Way:
-    """A movement with its route and whom it meets."""
+    """A movement with its route and the starting areas that it meets."""
     met = here.lines.query(LineString(route.path.points), "intersects").tolist()
     return Way(
         turn=movement.turn,
@@ -170,7 +170,7 @@ def _way(here: InspectedNetwork, movement: Movement, route: EgoRoute) -> Way:
 
 
 def _areas(here: InspectedNetwork, route: EgoRoute) -> tuple[StartingArea, ...]:
-    """Where testers start that meet a route, none where there is no pavement."""
+    """The starting areas of testers that meet a route, none without a pavement."""
     try:
         return starting_areas(here.network, here.roads, route.path, here.ways)
     except NetworkError:

@@ -1,8 +1,8 @@
-"""Which junctions of a network are pieces of one intersection, as where dual carriageways cross.
+"""The junctions of a network that are pieces of one intersection, as where dual carriageways cross.
 
-SUMO has a junction wherever edges meet, so that the crossing of two dual carriageways is four of
-them, a few metres apart. Two junctions are pieces of one intersection if an edge shorter than
-SHORT_M connects them and it lies inside of it:
+SUMO has a junction at every meeting of edges, so that the crossing of two dual carriageways is four
+of them, a few metres apart. Two junctions are pieces of one intersection if an edge shorter than
+SHORT_M connects them and one of these holds:
 
 * it is shorter than TOUCHING_M and no other road begins at one end (a crossing beside a junction),
 * one traffic light controls both, or

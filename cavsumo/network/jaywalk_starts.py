@@ -1,4 +1,4 @@
-"""Where jaywalkers start: anywhere beside the carriageway along the ego's path."""
+"""The starting areas of jaywalkers: all places beside the carriageway along the ego's path."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ def kerb_areas(network: Network, roads: Roads, ego_path: Path) -> tuple[Starting
 
 
 def _axis(piece: shapely.Geometry) -> Path | None:
-    """A piece of the outline as a path, None for what is too short."""
+    """A piece of the outline as a path, None if it is too short."""
     if piece.geom_type != "LineString" or piece.length < LEAST_M:
         return None
     return Path(piece.simplify(ROUND_M).coords)

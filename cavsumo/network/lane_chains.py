@@ -1,4 +1,4 @@
-"""Lanes one after another, junction interiors included, as straight on as the roads lead."""
+"""Chains of lanes, junction interiors included, as straight as the roads permit."""
 
 from __future__ import annotations
 
@@ -54,12 +54,12 @@ def onward(network: Network, lane: Any, wanted: float) -> list[Any]:
 
 
 def drivable(lanes: Sequence[Any]) -> Path:
-    """The centre line through lanes that follow each other, without corners nobody can drive."""
+    """The centre line through a chain of lanes, without corners that cannot be driven."""
     return without_corners(point for lane in lanes for point in lane_shape(lane))
 
 
 def without_corners(points: Iterable[Point]) -> Path:
-    """The path through points, but for those at which it would turn too sharply."""
+    """The path through points, without those at which it would turn too sharply."""
     kept: list[Point] = []
     for point in points:
         while kept and math.dist(kept[-1], point) < 0.01:
@@ -71,7 +71,7 @@ def without_corners(points: Iterable[Point]) -> Path:
 
 
 def _corner(a: Point, b: Point, c: Point) -> float:
-    """By how much a way from a over b to c turns at b [rad]."""
+    """The turn at b of a way from a over b to c [rad]."""
     turn = math.atan2(c[1] - b[1], c[0] - b[0]) - math.atan2(b[1] - a[1], b[0] - a[0])
     return abs(math.remainder(turn, math.tau))
 
@@ -101,7 +101,7 @@ def _preference(link: Any) -> tuple[float, str, str]:
 
 
 def _bend(link: Any) -> float:
-    """By how much the heading changes from the end of one lane to the start of the next [rad]."""
+    """The change of heading from the end of one lane to the start of the next [rad]."""
     a, b = lane_shape(link.getFromLane())[-2:]
     c, d = lane_shape(link.getToLane())[:2]
     return _corner(a, b, (b[0] + d[0] - c[0], b[1] + d[1] - c[1]))

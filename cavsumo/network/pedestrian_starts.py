@@ -1,6 +1,6 @@
-"""Where tester pedestrians start: on the pavements beside the ego's path, seeded.
+"""The starts of tester pedestrians on the pavements beside the ego's path, drawn from a seed.
 
-Nobody starts in another body, or so near that it could not stop before it.
+No pedestrian starts in another body, or too near to stop before it.
 """
 
 from __future__ import annotations
@@ -82,7 +82,7 @@ def draw_starts(
 ) -> tuple[Start, ...]:
     """One start for each body, uniform over the areas, apart from each other, facing along.
 
-    Two bodies have room to stop before each other, unless only starts without it are left.
+    Two bodies have room to stop before each other, unless only starts without that room remain.
     Consumes the generator. Raises NetworkError when the bodies do not fit.
     """
     starts: list[Start] = []
@@ -104,7 +104,7 @@ def clear_starts(
 ) -> tuple[Start, ...]:
     """The same starts, but those that are not clear of the boxes of others drawn again.
 
-    Where no draw helps the start is moved along the pavements. Consumes the generator if a start
+    If no draw succeeds, the start is moved along the pavements. Consumes the generator if a start
     has to be drawn. Raises NetworkError when there is no room.
     """
     found = list(starts)
@@ -138,7 +138,7 @@ def _draws(
     starts: Sequence[Start],
     rooms: Sequence[Box],
 ) -> Iterator[Start]:
-    """Starts apart from others, until one has its room clear, or enough were drawn."""
+    """Starts apart from others, until one has clear room ahead, or the draws are used up."""
     for _ in range(ATTEMPTS):
         start = _draw(areas, kind, rng)
         if _apart(start, starts):
@@ -176,7 +176,7 @@ def _stretches(
 def stretches(
     pavement: Path, width: float, walk: tuple[str, ...], met: Sequence[bool]
 ) -> list[StartingArea]:
-    """The runs of pieces of a pavement that lead across the ego's path, by what each of them does.
+    """The runs of pieces of a pavement that lead across the ego's path, given whether each does.
 
     The pieces are of the same length.
     """
@@ -219,7 +219,7 @@ def _draw(areas: Sequence[StartingArea], kind: Kind, rng: np.random.Generator) -
 
 
 def _range(area: StartingArea, kind: Kind) -> tuple[float, float]:
-    """Between which arc lengths of its axis a body may start on an area [m]."""
+    """The interval of arc lengths in which a body may start on an area [m]."""
     margin = math.hypot(kind.length, kind.width) / 2
     low, high = max(area.begin, margin), min(area.end, area.pavement.length - margin)
     middle = (area.begin + area.end) / 2

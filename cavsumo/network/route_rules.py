@@ -11,7 +11,7 @@ from cavsumo.model.carriageway import Limit, MarkedCrossing
 from cavsumo.network.ego_routes import EgoRoute, lanes_along
 from cavsumo.network.reader import Network, lane_areas
 
-PRIORITY = "M"  # SUMO's state of a link that goes before others
+PRIORITY = "M"  # SUMO's state of a link with priority
 
 
 def limits_along(network: Network, route: EgoRoute) -> tuple[Limit, ...]:
@@ -43,7 +43,7 @@ def crossings_along(network: Network, route: EgoRoute) -> tuple[MarkedCrossing, 
 
 
 def _marked(edge: Any, begin: float, end: float, surface: shapely.Geometry) -> MarkedCrossing:
-    """A crossing with what the network says of who goes first."""
+    """A crossing with the network's right of way."""
     links = [link for way in edge.getIncoming().values() for link in way]
     lights = [(str(link.getTLSID()), int(link.getTLLinkIndex())) for link in links]
     light = next((light for light in lights if light[0]), None)
@@ -52,6 +52,6 @@ def _marked(edge: Any, begin: float, end: float, surface: shapely.Geometry) -> M
 
 
 def _ends(path: LineString, shared: shapely.Geometry) -> tuple[float, float]:
-    """Where on a path its part on a surface begins and ends [m]."""
+    """Begin and end of the part of a path that lies on a surface [m]."""
     alongs = [path.project(Point(p)) for p in shapely.get_coordinates(shared)]
     return min(alongs), max(alongs)

@@ -1,6 +1,6 @@
-"""Where a test takes place: what was derived from the network, ready for every episode.
+"""The place of a test: all data derived from the network, ready for every episode.
 
-A plain picklable record, derived once by the parent and handed to the processes that simulate.
+A plain picklable record, derived once by the parent and sent to the simulating processes.
 """
 
 from __future__ import annotations
@@ -57,15 +57,15 @@ class Site:
         net: the network file.
         route: the ego's route.
         roads: carriageways and the ways across them.
-        areas: where testers on foot may start.
+        areas: starting areas of tester pedestrians.
         crossings: the surface of the marked crossings.
         demand: background traffic drawn for it, as the text of a route file; None for none.
-        light: how the first traffic light on the ego's route begins an episode; None for as it is.
-        approaches: the ways on which tester vehicles may meet the ego; none for testers on foot.
+        light: initial state of the first traffic light on the ego's route; None to keep SUMO's.
+        approaches: the ways on which tester vehicles may meet the ego; none for pedestrians.
         lights: the traffic lights on the ego's route.
         marked: the marked pedestrian crossings on the ego's route.
         limits: the speed limits on the ego's route.
-        ground: all that one can walk or drive on near the route, where testers on foot keep to it.
+        ground: the areas for walking or driving near the route, if pedestrians must stay on it.
     """
 
     net: Path
@@ -91,7 +91,7 @@ class Site:
         return draw_vehicles(self.approaches, kinds, box, start_speed, rng)
 
     def blocked(self, kinds: Sequence[Kind], starts: Sequence[Start], taken: Sequence[Box]) -> bool:
-        """Whether somebody is where a tester on a pavement starts, or right before it."""
+        """Whether a body stands at or right before the start of a tester on a pavement."""
         drawn = [(s, kind) for s, kind in zip(starts, kinds, strict=True) if s.pavement]
         return not all(is_clear(room(start, kind), taken) for start, kind in drawn)
 
@@ -102,7 +102,7 @@ class Site:
         taken: Sequence[Box],
         rng: np.random.Generator,
     ) -> tuple[Start, ...]:
-        """The starts of testers on foot with those that are blocked drawn again.
+        """The starts of tester pedestrians, with blocked starts drawn again.
 
         Consumes the generator. Raises NetworkError when there is no room.
         """
@@ -111,7 +111,7 @@ class Site:
     def scene(
         self, dt: float, ego: Body, bodies: Sequence[Body], starts: Sequence[Start], seed: int
     ) -> Scene:
-        """What does not change during an episode here."""
+        """The constant part of an episode at this site."""
         return Scene(
             dt=dt,
             ego=ego,
@@ -129,7 +129,7 @@ class Site:
 
 @dataclass(frozen=True)
 class Wishes:
-    """What a scenario may ask of its site besides the route.
+    """The requirements of a scenario on its site besides the route.
 
     Attributes:
         kind: of the testers.
@@ -137,7 +137,7 @@ class Wishes:
         jaywalk: testers start anywhere beside the road, not on pavements only.
         volume: the background traffic to draw.
         signal: the colour that the ego meets at the first traffic light.
-        pace: how fast the ego comes there.
+        pace: the speed at which the ego arrives there.
     """
 
     kind: Kind = PEDESTRIAN
@@ -155,10 +155,10 @@ def derive_site(
     ego: Kind,
     wishes: Wishes = Wishes(),
 ) -> Site:
-    """Read a network and derive the ego's route and where testers start.
+    """Read a network and derive the ego's route and the starts of testers.
 
-    ``ego_route`` are edges, or one word for a turn. Raises InputError (UnknownName, NetworkError)
-    in one sentence.
+    ``ego_route`` is a list of edges, or one word for a turn. Raises InputError (UnknownName,
+    NetworkError) in one sentence.
     """
     network = read_network(net, foes=wishes.kind.name not in WALKING)
     try:
@@ -214,7 +214,7 @@ def _route(
     half_m: float,
     met: Callable[[EgoRoute], Where],
 ) -> tuple[EgoRoute, Where]:
-    """The ego's route, given or the best on which testers can meet it, and from where they do.
+    """The ego's route, given or the best on which testers can meet it, and their starting areas.
 
     ``half_m`` is half the ego's length.
     """
@@ -232,7 +232,7 @@ def _route(
 def best_route(
     network: Network, roads: Roads, junction: str | None, half_m: float
 ) -> tuple[EgoRoute, tuple[StartingArea, ...]]:
-    """The best-ranked route that testers on foot can reach, and where they start.
+    """The best-ranked route that pedestrians can reach, and their starting areas.
 
     ``half_m`` is half the ego's length. Raises the NetworkError of the first route when testers
     reach none.
@@ -244,7 +244,7 @@ def best_route(
 def _first_met(
     routes: Iterator[EgoRoute], met: Callable[[EgoRoute], Where]
 ) -> tuple[EgoRoute, Where]:
-    """The first of the routes on which testers can meet the ego, and from where they do."""
+    """The first of the routes on which testers can meet the ego, and their starting areas."""
     first: NetworkError | None = None
     for route in islice(routes, ATTEMPTS):
         try:

@@ -1,9 +1,9 @@
 """Background traffic for any network, drawn from its own roads, as the text of a route file.
 
-Cars enter where roads come in from outside and leave where they go out, seldom in between, by the
-fastest way. At the beginning those are on the road who would have set out before. Pedestrians walk
-from pavement to pavement. Roads far from the ego's path are left out: nobody comes from there
-during an episode, and the traffic of a large network would cost more than the test.
+Cars enter and leave mostly at the border of the network and take the fastest way. At the beginning
+the cars are on the road that would have departed before. Pedestrians walk from pavement to
+pavement. Roads far from the ego's path are left out: no body comes from there during an episode,
+and the traffic of a large network would cost more than the test.
 """
 
 from __future__ import annotations
@@ -22,12 +22,12 @@ from cavsumo.network.ego_routes import EgoRoute
 from cavsumo.network.reader import Network, is_pavement, lane_shape
 from cavsumo.network.trips import Road, Trips, is_near, roads_near
 
-BEFORE_S = 120.0  # cars on the road at the beginning set out during the time before
-WALK_S = 90.0  # as many pedestrians are there at the beginning as set out in that time
-WALK_M = 250.0  # where they go is no farther than this
-MARGIN_M = 2.0  # they stay that far from the ends of a road
-# Cars on the road at the beginning have room: from the beginning of a road, before its end, from
-# each other, and before the ego's bumper [m].
+BEFORE_S = 120.0  # cars on the road at the beginning departed during this time before
+WALK_S = 90.0  # number of pedestrians at the beginning: the departures of this time
+WALK_M = 250.0  # largest distance of their destinations
+MARGIN_M = 2.0  # their distance from the ends of a road
+# Distances of the cars on the road at the beginning: from the beginning of a road, before its end,
+# from each other, and before the ego's bumper [m].
 FROM_BEGINNING_M, BEFORE_END_M, APART_M, CLEAR_M = 6.0, 15.0, 15.0, 40.0
 ATTEMPTS = 5
 CAR = "background_car"
@@ -35,12 +35,12 @@ CAR = "background_car"
 
 @dataclass(frozen=True)
 class Volume:
-    """How much traffic.
+    """The density of background traffic.
 
     Attributes:
         vehicles: cars that set out, per minute and kilometre of road, each direction counted.
         persons: pedestrians that set out, per minute and kilometre of pavement.
-        duration: how long others set out [s].
+        duration: time during which others depart [s].
         seed: of the batch; one demand serves all its episodes.
     """
 
@@ -91,7 +91,7 @@ def _count(rate: float, roads: Iterable[Road | Pavement], seconds: float) -> int
 def _cars(
     roads: dict[str, Road], route: EgoRoute, volume: Volume, rng: np.random.Generator
 ) -> Iterator[tuple[float, str]]:
-    """The cars that are on the road at the beginning, then those that follow, with their times."""
+    """The cars on the road at the beginning, then the later ones, with their times."""
     trips = Trips(roads, route.edges, rng)
     taken: dict[str, list[float]] = {}
     number = 0
@@ -111,7 +111,7 @@ def _placed(
 ) -> tuple[list[Road], str] | None:
     """The rest of a trip that began before, and how far its first road is driven [m].
 
-    None when the car has arrived, or where others are or the ego is to enter.
+    None if the car has arrived, or its place belongs to another car or to the ego's entry.
     """
     for _ in range(ATTEMPTS):
         trip = trips.draw()
@@ -128,7 +128,7 @@ def _placed(
 
 
 def _underway(trip: Sequence[Road], elapsed: float) -> tuple[list[Road], float] | None:
-    """What is left of a trip some time after its beginning [s], and how far along its first road.
+    """The rest of a trip some time after its beginning [s], and the position on its first road.
 
     Cars in a road too short for room at both ends have come to the next.
     """

@@ -1,6 +1,6 @@
-"""How a traffic light is set at the start, so that the ego meets the colour asked for.
+"""The initial phase of a traffic light with which the ego meets the required colour.
 
-Pure: the light's program and the ego's way come from the network; the world only sets the phase.
+The light's program and the ego's way come from the network; the world only sets the phase.
 """
 
 from __future__ import annotations
@@ -19,14 +19,14 @@ from cavsumo.network.reader import Network
 
 # SUMO's letters of a link; G comes before g, which gives way.
 LETTERS = {"green": ("G", "g"), "red": ("r",)}
-PREPARED_S = 1.0  # the colour has been shown that long when the ego starts, if it lasts
+PREPARED_S = 1.0  # how long the colour has been shown when the ego starts, if possible
 STANDING = 1.0  # m/s, egos that start more slowly are expected to speed up
 PICK_UP = 2.6  # m/s2, as they do
 
 
 @dataclass(frozen=True)
 class Pace:
-    """How fast an ego drives when nothing hinders it.
+    """The speed of an unhindered ego.
 
     Attributes:
         start: its speed at the start, which it keeps [m/s]; None for what the road allows.
@@ -39,7 +39,7 @@ class Pace:
 
 @dataclass(frozen=True)
 class LightStart:
-    """How a traffic light begins an episode.
+    """The initial state of a traffic light in an episode.
 
     Attributes:
         light: its id.
@@ -70,7 +70,8 @@ class LightOnRoute:
 
 
 def light_start(network: Network, route: EgoRoute, signal: Signal, pace: Pace) -> LightStart | None:
-    """How the first light on the route must start, for an unhindered ego to meet a colour.
+    """The initial state of the first light on the route with which an unhindered ego meets a
+    colour.
 
     None for any colour. Raises NetworkError when there is no light, when it does not run by the
     clock, or when it never shows that colour.
@@ -81,7 +82,7 @@ def light_start(network: Network, route: EgoRoute, signal: Signal, pace: Pace) -
     program = _program(network, approach.light, signal)
     phases = [(float(phase.duration), str(phase.state)) for phase in program.getPhases()]
     arrives = arrival(approach.legs, pace)
-    # Green as long before as it takes to be on when the ego starts; red in the middle.
+    # Green is already shown when the ego starts; red is met in the middle of its phase.
     lead = arrives + PREPARED_S if signal == "green" else math.inf
     for letter in LETTERS[signal]:
         start = phase_at_start(phases, approach.link, letter, arrives, lead)
@@ -145,7 +146,7 @@ def arrival(legs: Sequence[tuple[float, float]], pace: Pace) -> float:
 def phase_at_start(
     phases: Sequence[tuple[float, str]], link: int, letter: str, arrival_s: float, lead_s: float
 ) -> tuple[int, float] | None:
-    """The phase at the start and what is left of it [s], so that the link shows a letter later.
+    """The phase at the start and its remaining time [s] with which the link later shows a letter.
 
     The ego arrives in the longest run of phases that show it, at their middle at the latest. None
     when no phase shows the letter.

@@ -13,13 +13,13 @@ from shapely.geometry import LineString
 from cavsumo.network.reader import Network, driving_lanes, is_normal, lane_shape
 
 REACH_M = 300.0  # roads farther than this from the ego's path have no traffic
-BORDER = 10.0  # as many times more trips begin and end on a metre of road at the border
+BORDER = 10.0  # how many times more trips begin and end on a metre of road at the border
 LEAST_ROADS = 3  # trips are at least that many roads long where possible
 
 
 @dataclass(frozen=True)
 class Road:
-    """A road for cars, as far as trips need it.
+    """A road for cars, with the data that trips need.
 
     Attributes:
         id: of its edge.
@@ -112,7 +112,7 @@ class Trips:
 
 
 def _ways(roads: dict[str, Road], start: str) -> dict[str, list[str]]:
-    """The fastest way from a road to each that can be reached (Dijkstra); ties by id."""
+    """The fastest way from a road to each reachable road (Dijkstra); ties by id."""
     ways: dict[str, list[str]] = {}
     waiting: list[tuple[float, str, str]] = [(0.0, start, "")]
     while waiting:

@@ -1,7 +1,7 @@
-"""Where tester vehicles start, and how fast: so that they can meet an ego that nothing hinders.
+"""The starts and speeds of tester vehicles with which they can meet an unhindered ego.
 
-The ego is expected to drive at the speed limit from its start. A vehicle that crosses its way is
-placed so that, unhindered too, it would arrive a little earlier: it can wait, but not hurry.
+The ego is expected to drive at the speed limit from its start. A crossing vehicle is placed so that
+it would arrive a little earlier, because it can wait but not gain time.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ CALM = (
     0.6,
     1.0,
 )  # speed of a vehicle that crosses or drives beside, as a share of what it may drive
-SLOW = (0.4, 0.7)  # speed of one ahead of the ego, which is to catch up with it
+SLOW = (0.4, 0.7)  # speed of a leader, with which the ego is to catch up
 BRAKING_MPS2 = 3.0  # a vehicle starts no faster than it can stop with this before it must wait
 APART_M = 3.0  # smallest gap between two bodies at the start
 ATTEMPTS = 100
@@ -52,7 +52,7 @@ def draw_vehicles(
     for kind in kinds:
         for attempt in range(ATTEMPTS):
             approach = _choose(approaches, used, rng)
-            anywhere = attempt >= ATTEMPTS // 2  # better not in time than not at all
+            anywhere = attempt >= ATTEMPTS // 2  # a late vehicle is better than none
             start = _draw(approach, kind, ego, start_speed, anywhere, rng)
             box = Box(start.x, start.y, start.o, kind.length, kind.width)
             if all(gap(box, other) > APART_M for other in boxes):

@@ -1,4 +1,4 @@
-"""Everything that a report says, in one record; nothing here knows how it is shown."""
+"""All figures of a report in one record, independent of their presentation."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ class Report:
 
 
 def analyse(files: Sequence[Path], by: str = "agent") -> Report:
-    """Read results and compute all that a report says; raises InputError for what is wrong."""
+    """Read results and compute all figures of a report; raises InputError for wrong input."""
     evidence = load(files, by)
     groups = grouped(evidence, by)
     tests = described(evidence)

@@ -1,4 +1,4 @@
-"""What tables of a report are made of: the table itself, labels of groups, numbers as text."""
+"""The parts of a report's tables: the table itself, labels of groups, numbers as text."""
 
 from __future__ import annotations
 
@@ -18,13 +18,13 @@ class Table:
     """A table of text.
 
     Attributes:
-        topic: what it belongs to, one of ``TOPICS``.
-        title: what it tells.
-        words: the titles of its first columns, which hold words and stand to the left.
-        numbers: the titles of the others, which hold numbers and stand to the right.
+        topic: one of ``TOPICS``.
+        title: its title.
+        words: the titles of its first columns, which hold words, aligned to the left.
+        numbers: the titles of the others, which hold numbers, aligned to the right.
         rows: one cell a column.
-        heads: in how many of the first columns words that repeat those above may be left out.
-        notes: what one must know to read it, a sentence each.
+        heads: number of first columns in which words equal to those above may be left out.
+        notes: explanations, one sentence each.
     """
 
     topic: str
@@ -37,7 +37,7 @@ class Table:
 
 
 class Labels:
-    """The columns that say of whom a row is, as few as are needed."""
+    """The columns that identify the group of a row, as few as are needed."""
 
     def __init__(self, report: Report) -> None:
         several = any(group.setting for group in report.groups)
@@ -51,7 +51,7 @@ class Labels:
 
 
 def number(value: float) -> str:
-    """Three significant digits, without an exponent where that can be read."""
+    """Three significant digits, without an exponent where that is readable."""
     if math.isinf(value) or value == 0:
         return f"{value:g}"
     if abs(value) < 1e-4 or abs(value) >= 1e5:

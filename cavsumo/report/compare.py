@@ -49,7 +49,7 @@ class PairedComparison:
         ratio: the first's rate over the second's; infinite over none, None when neither has any.
         interval: its 95 % interval.
         p, p_holm: McNemar's p-value; the same adjusted for all comparisons of the report.
-        sequential: interval and p-value hold whenever one stops.
+        sequential: interval and p-value are valid at any stopping time.
     """
 
     setting: str
@@ -66,9 +66,9 @@ class PairedComparison:
 
 
 def comparisons(groups: Sequence[Group], by: str = "agent") -> list[PairedComparison]:
-    """All pairs of groups that differ in what rows are grouped by and in nothing else.
+    """All pairs of groups that differ only in the column by which rows are grouped.
 
-    The later one comes first, so that the first agent named is what others are compared with.
+    The later one comes first, so that the other agents are compared with the first agent.
     """
     found = [
         _compared(later, earlier, event, by)

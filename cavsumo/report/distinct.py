@@ -1,7 +1,7 @@
-"""How many of the tests and failures differ: cells of speed, side, place and kind of tester.
+"""The number of distinct tests and failures: cells of speed, side, place and kind of tester.
 
-Two tests are alike when they lie in the same cell. How many cells were not met yet is estimated
-from those met once (Good and Turing: Good 1953, Biometrika 40, 237) or once and twice (Chao 1984,
+Two tests are alike if they lie in the same cell. The number of cells not yet found is estimated
+from those found once (Good and Turing: Good 1953, Biometrika 40, 237) or once and twice (Chao 1984,
 Scand. J. Stat. 11, 265).
 """
 
@@ -23,10 +23,10 @@ SPEED_BIN, PLACE_BIN = 2.0, 10.0  # m/s, m
 
 
 class Cell(NamedTuple):
-    """What makes two tests alike.
+    """The features that two similar tests share.
 
     Attributes:
-        setting: where they were played, if there are several settings.
+        setting: the setting, if there are several.
         kind: kind of tester.
         side: of the ego.
         speed, place: lower bounds of the closing speed [m/s] and of the ego's way so far [m].
@@ -41,14 +41,15 @@ class Cell(NamedTuple):
 
 @dataclass(frozen=True)
 class Diversity:
-    """How many cells there are.
+    """The numbers of cells.
 
     Attributes:
-        total: how many tests, or failures.
-        known: of how many the cell is known.
-        cells: how many cells they lie in.
-        estimate: Chao's lower bound for how many there are, met or not; None when none is known.
-        new: Good and Turing's share of the next ones that would lie in a new cell; None likewise.
+        total: number of tests, or failures.
+        known: number of those whose cell is known.
+        cells: number of their cells.
+        estimate: Chao's lower bound on the number of all cells, found or not; None when none is
+            known.
+        new: Good and Turing's estimate of the share of the next ones in a new cell; None likewise.
     """
 
     total: int
@@ -60,7 +61,7 @@ class Diversity:
 
 @dataclass(frozen=True)
 class Distinct(Told):
-    """How different the tests and the failures of a group are.
+    """The diversity of the tests and of the failures of a group.
 
     Attributes:
         preventable, failures: at their impacts.
@@ -74,7 +75,7 @@ class Distinct(Told):
 
 @dataclass(frozen=True)
 class FailureCell:
-    """Failures that are alike, of all agents together.
+    """Similar failures of all agents together.
 
     Attributes:
         cell: what they have in common.
@@ -120,10 +121,10 @@ def distinct(group: Group, tests: Mapping[int, Described], batches: tuple[Batch,
 
 
 def diversity(cells: Iterable[Cell | None]) -> Diversity:
-    """How many cells there are, and how many there may be.
+    """The number of cells, found and estimated.
 
     Chao's bound with the correction of its bias: S + f1 (f1 - 1) / (2 (f2 + 1)), where f1 and f2
-    are how many cells were met once and twice.
+    are the numbers of cells found once and twice.
     """
     cells = list(cells)
     counts = Counter(cell for cell in cells if cell is not None)

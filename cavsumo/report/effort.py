@@ -1,4 +1,4 @@
-"""What tests and failures cost: per second simulated and per second of the processes."""
+"""The rate of tests and failures per simulated second and per second of the processes."""
 
 from __future__ import annotations
 
@@ -15,10 +15,10 @@ from cavsumo.results.statistics import Interval
 
 @dataclass(frozen=True)
 class PerSecond:
-    """How many a second.
+    """A rate per second.
 
     Attributes:
-        value: how many; None without any time.
+        value: the rate; None without any time.
         interval: its 95 % interval; None with fewer than two episodes that have any.
     """
 
@@ -28,7 +28,7 @@ class PerSecond:
 
 @dataclass(frozen=True)
 class Effort(Told):
-    """What a group took and gave.
+    """The effort of a group and its yield.
 
     Attributes:
         simulated_s: simulated time of its valid episodes [s].
@@ -79,7 +79,7 @@ def per_second(counts: NDArray[np.float64], seconds: NDArray[np.float64]) -> Per
 
     The interval is normal on the logarithm, with the variance of a ratio of means over independent
     episodes (Cochran 1977, Sampling Techniques, section 6.3): counts and lengths may depend on
-    each other, as they do, for an episode ends with its test.
+    each other, as they do, because an episode ends with its test.
     """
     total, time, n = float(counts.sum()), float(seconds.sum()), len(counts)
     if time <= 0.0:

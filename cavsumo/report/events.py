@@ -1,4 +1,4 @@
-"""What a trace tells of a test: how fast, from which side and where along the ego's way.
+"""The data of a test in its trace: closing speed, side of the ego, place along the ego's way.
 
 A test is described at its trigger, a failure also at its impact. Where no trace was kept, only the
 closing speed of an impact is known, from the row.
@@ -27,7 +27,7 @@ USED += ["impact_speed_mps"]
 
 
 class Event(NamedTuple):
-    """A moment of a test; None for what is not known.
+    """A moment of a test; None for unknown values.
 
     Attributes:
         speed: closing speed, along the ego's heading [m/s].
@@ -80,7 +80,7 @@ def describe(row: Mapping[str, Any], csv_file: Path) -> Described:
 
 
 def _event(moment: Moment | None, tester: str, side: Callable[[Pose, Pose], str]) -> Event:
-    """A moment of a trace; nothing is known without it or without the tester."""
+    """A moment of a trace; all values are unknown without it or without the tester."""
     if moment is None or tester not in moment[1]["testers"]:
         return Event()
     place, frame = moment
@@ -90,7 +90,7 @@ def _event(moment: Moment | None, tester: str, side: Callable[[Pose, Pose], str]
 
 
 def side_ahead(ego: Pose, other: Pose) -> str:
-    """Where a body is across the ego's heading."""
+    """The position of a body across the ego's heading."""
     _, across = _seen(ego, other)
     if abs(across) <= EGO_KIND.width / 2:
         return FRONT
@@ -109,6 +109,6 @@ def side_hit(ego: Pose, other: Pose) -> str:
 
 
 def _seen(ego: Pose, other: Pose) -> tuple[float, float]:
-    """A body's centre as the ego sees it: ahead and to the left [m]."""
+    """A body's centre in the ego's frame: ahead and to the left [m]."""
     dx, dy, c, s = other[0] - ego[0], other[1] - ego[1], math.cos(ego[3]), math.sin(ego[3])
     return dx * c + dy * s, dy * c - dx * s

@@ -1,4 +1,4 @@
-"""A report as plain figures: nested for JSON, one a line for CSV."""
+"""A report as plain figures: nested for JSON, one per line for CSV."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ Line = tuple[Any, ...]
 
 
 def as_json(report: Report) -> dict[str, Any]:
-    """Everything as JSON; a bound that is infinite is null beside one that is not."""
+    """All figures as JSON; an infinite bound is null beside a finite one."""
     counts = report.evidence.rows["batch"].value_counts()
     return {
         "format": FORMAT,
@@ -44,7 +44,7 @@ def as_json(report: Report) -> dict[str, Any]:
 
 
 def _batch(batch: Batch, episodes: int) -> dict[str, Any]:
-    """Where rows come from."""
+    """The source of rows."""
     scenario = batch.plan.scenario
     return {
         "file": str(batch.csv_file),
@@ -62,7 +62,7 @@ def _batch(batch: Batch, episodes: int) -> dict[str, Any]:
 
 
 def _plain(value: Any, leave_out: Sequence[str] = ()) -> Any:
-    """A record as what JSON has."""
+    """A record in JSON's types."""
     if isinstance(value, Share):
         ends = {name: [rate.low, rate.high] for name, rate in value.intervals.items()}
         head = {"count": value.count, "total": value.total, "of": value.of, "value": value.value}

@@ -19,13 +19,14 @@ from cavsumo.report.figures import COLUMNS, as_json, lines
 from cavsumo.report.tables import tables
 
 WIDTH, INDENT = 100, 2
-WIDEST = 1000  # of tables whose figures need it, which are never cut off
-WORD = 28  # columns that words need at least, where there are so many
+WIDEST = 1000  # of tables whose figures need it; figures are never cut off
+WORD = 28  # least width of a column of words
 
 
 def as_table(report: Report) -> str:
     """Tables for people, 100 columns wide where the figures allow it."""
-    console = Console(file=io.StringIO(), width=WIDTH, color_system=None)
+    text = io.StringIO()  # rich would show it in a notebook instead
+    console = Console(file=text, width=WIDTH, color_system=None, force_jupyter=False)
     for i, table in enumerate(tables(report)):
         if i:
             console.print()
@@ -37,13 +38,11 @@ def as_table(report: Report) -> str:
         console.width = WIDTH
         for note in table.notes:
             console.print(Padding(Text(note), (0, 0, 0, INDENT)), highlight=False)
-    stream = console.file
-    assert isinstance(stream, io.StringIO)
-    return "".join(f"{line.rstrip()}\n" for line in stream.getvalue().splitlines())
+    return "".join(f"{line.rstrip()}\n" for line in text.getvalue().splitlines())
 
 
 def _grid(table: Table) -> Grid:
-    """A table as rich draws it; words that repeat those above are left out."""
+    """A table drawn by rich; words equal to those above are left out."""
     grid = Grid(box=None, pad_edge=False, padding=(0, 2, 0, 0))
     for i, title in enumerate((*table.words, *table.numbers)):
         longest = max(len(cell) for cell in (title, *(row[i] for row in table.rows)))
@@ -108,7 +107,7 @@ def as_csv(report: Report) -> str:
 
 
 def as_json_text(report: Report) -> str:
-    """Everything, for programs."""
+    """All figures, for programs."""
     return json.dumps(as_json(report), indent=1, ensure_ascii=False, allow_nan=False) + "\n"
 
 

@@ -1,4 +1,4 @@
-"""Which rows are told together: those of one agent in one setting, and of one value of a column."""
+"""Groups of rows: those of one agent in one setting, and of one value of a column."""
 
 from __future__ import annotations
 
@@ -13,10 +13,10 @@ from cavsumo.errors import InputError
 from cavsumo.report.load import Batch, Evidence
 from cavsumo.results.provenance import EXTENT, differences
 
-MOST = 200  # groups; more is no report
-# Settings in which batches may differ and still be told together.
+MOST = 200  # groups; more would not be readable
+# Settings in which batches of one group may differ.
 APART = EXTENT | {"agents", "shard", "seed", "trace"}
-# What differs of necessity where rows are grouped by a column, and so must not keep them apart.
+# Settings that necessarily differ if rows are grouped by a column, and so do not separate groups.
 MEANT: dict[str, frozenset[str]] = {
     "ego": frozenset({"ego", "ego_params"}),
     "testers": frozenset({"testers", "bodies_per_agent"}),
@@ -25,16 +25,16 @@ MEANT: dict[str, frozenset[str]] = {
     "sumo_width_m": frozenset({"sumo_width"}),
     "net": frozenset({"net", "routes", "additional", "ego_route", "junction"}),
 }
-COMPARED = ("versions", "sha256", "sumo_options")  # parts of a manifest, besides the plan
+COMPARED = ("versions", "sha256", "sumo_options")  # parts of a manifest besides the plan
 WITH_FILES = ("net", "file")  # where the files' checksums differ too
 
 
 @dataclass(frozen=True)
 class Told:
-    """What is told of a group; base of the records that say something of one.
+    """The identity of a group; base of the records about groups.
 
     Attributes:
-        setting: which setting, as the names of the files; empty when there is only one.
+        setting: the setting, as the names of its files; empty when there is only one.
         agent: the tester agent.
         value: the value of the column that rows are grouped by; empty when by agent.
     """
@@ -51,7 +51,7 @@ class Told:
 
 @dataclass(frozen=True)
 class Group(Told):
-    """Rows that are told together.
+    """A group of rows.
 
     Attributes:
         rows: its rows (``Evidence.rows``), by file and run.
@@ -65,18 +65,17 @@ class Group(Told):
 
     @property
     def valid(self) -> pandas.DataFrame:
-        """The rows that count as tried."""
+        """The rows of valid episodes."""
         return self.rows[~self.rows["outcome"].isin(("error", "invalid"))]
 
 
 def grouped(evidence: Evidence, by: str = "agent") -> list[Group]:
     """The groups in the order of settings, and of first appearance in each.
 
-    Batches whose scenarios, files and versions agree are one setting
-    (``provenance.differences``), so shards and batches of other seeds are told together; but each
-    episode counts once.
+    Batches whose scenarios, files and versions agree are one setting (``provenance.differences``),
+    so shards and batches of other seeds are combined; each episode counts once.
     """
-    if by != "file":  # which tells them apart
+    if by != "file":  # which distinguishes them
         _check_once(evidence)
     settings = settings_of(evidence.batches, by)
     names = _names(evidence.batches, settings)
@@ -108,7 +107,7 @@ def reference_of(batches: Sequence[Batch]) -> str:
 
 
 def settings_of(batches: Sequence[Batch], by: str) -> list[int]:
-    """For each batch which setting it is of, numbered from 0 as they appear."""
+    """The setting of each batch, numbered from 0 as they appear."""
     firsts: list[Batch] = []
     found: list[int] = []
     for batch in batches:
@@ -121,7 +120,7 @@ def settings_of(batches: Sequence[Batch], by: str) -> list[int]:
 
 
 def _apart(first: Batch, second: Batch, by: str) -> Iterator[str]:
-    """What keeps two batches apart."""
+    """The differences that separate two batches."""
     if by == "file":
         return iter(())
     empty: dict[str, Any] = {part: {} for part in COMPARED}
@@ -132,7 +131,7 @@ def _apart(first: Batch, second: Batch, by: str) -> Iterator[str]:
 
 
 def _names(batches: Sequence[Batch], settings: Sequence[int]) -> dict[int, str]:
-    """The settings by the names of their files; no names when there is but one."""
+    """The settings by the names of their files; no names if there is only one."""
     if len(set(settings)) <= 1:
         return dict.fromkeys(settings, "")
     names: dict[int, str] = {}

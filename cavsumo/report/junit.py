@@ -1,4 +1,4 @@
-"""JUnit XML, for continuous integration: a suite a results file, a case an agent and assertion."""
+"""JUnit XML for continuous integration: a suite per file, a case per agent and assertion."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ from cavsumo.results.failures import ORDER, PREVENTABLE, failure_kind, preventab
 from cavsumo.results.rows import verdicts_of
 
 SHOWN = 20  # failures or errors told of in one case
-# What XML 1.0 cannot hold, even escaped.
+# Characters that XML 1.0 cannot hold, even escaped.
 ILLEGAL = re.compile("[^\t\n\r\u0020-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
 
 
@@ -75,7 +75,7 @@ def _properties(parent: ET.Element, agent: str, found: Rates) -> None:
 
 
 def _case(batch: Batch, agent: str, assertion: str, rows: pandas.DataFrame) -> ET.Element:
-    """One agent and assertion: failed, held, or never put to the test."""
+    """One agent and assertion: failed, held, or never tested."""
     said = rows.apply(_verdict, axis=1, args=(assertion,)) if len(rows) else rows["outcome"]
     tests, failures = rows[said.isin(("held", "violated"))], rows[said == "violated"]
     case = ET.Element("testcase", classname=_legal(agent), name=assertion)
@@ -111,13 +111,13 @@ def _failed(batch: Batch, failures: Sequence[Mapping[Any, Any]], tests: int) -> 
 
 
 def _verdict(row: Mapping[Any, Any], assertion: str) -> str:
-    """What an assertion said of an episode; the outcome, if it is the only one recorded."""
+    """The verdict of an assertion on an episode; the outcome, if it is the only one recorded."""
     alone = row["outcome"] if row["assertion"] == assertion else ""
     return verdicts_of(row).get(assertion, alone)
 
 
 def _replay(batch: Batch, row: Mapping[Any, Any], assertion: str) -> str:
-    """What happened, and how to see it again."""
+    """The failure, and the command that replays it."""
     command = shlex.join(["cavsumo", "replay", str(batch.csv_file), str(row["run"])])
     told = event(row) if row["assertion"] == assertion else f"{assertion} violated"
     judged = "" if batch.plan.reference == "none" else f", {failure_kind(row)}"
@@ -146,7 +146,7 @@ def _errors(agent: str, rows: pandas.DataFrame) -> list[ET.Element]:
 
 
 def _with_rest(told: Sequence[str], total: int) -> str:
-    """What is told, and how much is not."""
+    """The first messages, and the number of the others."""
     rest = total - len(told)
     return "\n".join([*told, *([f"and {rest} more"] if rest else [])])
 
@@ -166,5 +166,5 @@ def _count(parent: ET.Element, cases: Any) -> None:
 
 
 def _legal(text: str) -> str:
-    """Text without what XML cannot hold."""
+    """Text without characters that XML cannot hold."""
     return ILLEGAL.sub("�", text)

@@ -1,4 +1,4 @@
-"""The rows of one or several results files as one table, with what their manifests add."""
+"""The rows of one or several results files as one table, with columns from their manifests."""
 
 from __future__ import annotations
 
@@ -11,15 +11,15 @@ from typing import Any
 
 import pandas
 
-from cavsumo.batch.replay import recorded_plan
 from cavsumo.batch.stopping import looks_at_rows
 from cavsumo.errors import ResultsError, UnknownName
 from cavsumo.model.scenario import BatchPlan
 from cavsumo.results.columns import COLUMNS
 from cavsumo.results.reading import whole_lines
+from cavsumo.results.recorded_plan import recorded_plan
 
 OUTCOMES = ("violated", "held", "unfair", "not_triggered", "invalid", "error")
-# What a report needs of the rows; other columns are read only when asked for.
+# The columns that a report needs; others are read only on request.
 NUMBERS = (
     "trigger_time_s",
     "violation_time_s",
@@ -46,7 +46,7 @@ WORDS = (
 )
 WHOLE = ("run", "seed")
 NEEDED = (*WHOLE, *WORDS, *NUMBERS)
-ADDED = ("file", "net")  # what one can group by besides the columns
+ADDED = ("file", "net")  # values for grouping besides the columns
 
 
 @dataclass(frozen=True)
@@ -54,8 +54,8 @@ class Batch:
     """One results file.
 
     Attributes:
-        csv_file, plan, manifest: where it lies, what was played.
-        sequential: how many episodes there are may depend on what they found.
+        csv_file, plan, manifest: its file, its plan, its manifest.
+        sequential: the number of episodes may depend on their results.
     """
 
     csv_file: Path
@@ -65,16 +65,16 @@ class Batch:
 
     @property
     def unfinished(self) -> bool:
-        """Whether episodes are missing and no rule said so."""
+        """Whether episodes are missing without a stopping rule."""
         return self.manifest.get("status") not in ("finished", "stopped")
 
 
 @dataclass(frozen=True)
 class Evidence:
-    """All rows, as a table: one row an episode, in the order of the files and of the runs.
+    """All rows as a table: one row per episode, in the order of the files and of the runs.
 
     Attributes:
-        batches: where the rows come from.
+        batches: the sources of the rows.
         rows: the columns ``NEEDED``, those of ``ADDED``, the one asked for and ``batch``, the index
             of the batch. Numbers are floats, NaN for none; words are text, empty for none.
     """
@@ -84,13 +84,13 @@ class Evidence:
 
 
 def check_column(by: str) -> None:
-    """Raise UnknownName unless rows can be grouped by it."""
+    """Raise UnknownName unless rows can be grouped by a column."""
     if by not in (*COLUMNS, *ADDED):
         raise UnknownName("column", by, (*COLUMNS, *ADDED), "--by")
 
 
 def load(files: Sequence[Path], by: str = "agent") -> Evidence:
-    """Read results; raises ResultsError in one sentence for whatever is missing or damaged."""
+    """Read results; raises ResultsError in one sentence for missing or damaged files."""
     check_column(by)
     _check_apart(files)
     batches = [_batch(file) for file in files]
@@ -100,7 +100,7 @@ def load(files: Sequence[Path], by: str = "agent") -> Evidence:
 
 
 def _check_apart(files: Sequence[Path]) -> None:
-    """Every file once."""
+    """Refuse a file that is named twice."""
     seen: set[Path] = set()
     for file in files:
         if file.resolve() in seen:
@@ -138,7 +138,7 @@ def _numbers(table: pandas.DataFrame, column: str, file: Path) -> pandas.Series:
 
 
 def _check_outcomes(table: pandas.DataFrame, file: Path) -> None:
-    """Outcomes must be ours, and tests must say when."""
+    """Check that outcomes are known, and that tests have a trigger time."""
     _refuse(
         table, ~table["outcome"].isin(OUTCOMES), "outcome", "one of " + ", ".join(OUTCOMES), file
     )

@@ -12,10 +12,10 @@ Z2 = 1.959963984540054**2  # squared, of a 95 % interval
 
 
 class Pairs(NamedTuple):
-    """Pairs of episodes by what happened in them.
+    """Pairs of episodes by their events.
 
     Attributes:
-        both, first, second, neither: in how many pairs it happened in both episodes, in the first
+        both, first, second, neither: numbers of pairs with the event in both episodes, in the first
             or the second only, or in neither.
     """
 
@@ -26,7 +26,7 @@ class Pairs(NamedTuple):
 
     @property
     def total(self) -> int:
-        """How many pairs there are."""
+        """The number of pairs."""
         return sum(self)
 
 
@@ -81,7 +81,7 @@ def _only_first(pairs: Pairs, t: float) -> float:
 
 
 def _root(excess: Callable[[float], float], start: float, side: int) -> float:
-    """The ratio to one side of the start at which an excess leaves zero."""
+    """The ratio, to one side of the start, at which an excess leaves zero."""
     from scipy.optimize import brentq
 
     inside = start > 0 and math.isfinite(start)
@@ -95,10 +95,10 @@ def _root(excess: Callable[[float], float], start: float, side: int) -> float:
 
 
 def sequential_ratio_interval(pairs: Pairs) -> Interval | None:
-    """An interval of the ratio that holds whenever one stops, at least 95 %.
+    """An interval of the ratio that is valid at any stopping time, at least 95 %.
 
-    From the confidence sequences of both rates at 97.5 % (Bonferroni); wide, for it does not
-    profit from the pairing.
+    From the confidence sequences of both rates at 97.5 % (Bonferroni); wide, because it does not
+    use the pairing.
     """
     if ratio(pairs) is None:
         return None
@@ -114,7 +114,8 @@ def sequential_ratio_interval(pairs: Pairs) -> Interval | None:
 def mcnemar(pairs: Pairs) -> float:
     """The two-sided p-value of McNemar's test, exact: binomial, not mid-p.
 
-    McNemar 1947, Psychometrika 12, 153. Of the pairs in which only one had it, each was as likely.
+    McNemar 1947, Psychometrika 12, 153. Of the pairs in which only one episode has the event, both
+    cases are equally likely.
     """
     from scipy.stats import binomtest
 
@@ -123,7 +124,7 @@ def mcnemar(pairs: Pairs) -> float:
 
 
 def sequential_mcnemar(pairs: Pairs) -> float:
-    """The same, valid whenever one stops."""
+    """The same, valid at any stopping time."""
     return sequential_p(pairs.first, pairs.first + pairs.second)
 
 

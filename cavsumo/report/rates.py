@@ -1,4 +1,4 @@
-"""What a group found, as shares with intervals."""
+"""The results of a group, as shares with intervals."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from cavsumo.batch.tally import tallied
 from cavsumo.report.grouping import Group, Told
 from cavsumo.results.statistics import Rate, rate, sequential_rate
 
-NO_RULE = "no rule"  # of those that blame knows
+NO_RULE = "no rule"  # the rules of ``blame``
 WILSON, EXACT, SEQUENTIAL = "Wilson", "Clopper-Pearson", "confidence sequence"
 
 
@@ -19,10 +19,10 @@ class Share:
     """A share of something, with its 95 % intervals by the names of the methods.
 
     Attributes:
-        count, total: how many of how many.
-        of: of what.
-        intervals: by Wilson and by Clopper and Pearson; or, where the number of episodes may depend
-            on what they found, the confidence sequence alone, for the others would not hold.
+        count, total: the numbers.
+        of: the meaning of the total.
+        intervals: by Wilson and by Clopper and Pearson; or, if the number of episodes may depend on
+            their results, the confidence sequence alone, because the others would not be valid.
     """
 
     count: int
@@ -93,7 +93,7 @@ def rates(group: Group) -> Rates:
 
 
 def share(count: int, total: int, of: str, *, sequential: bool) -> Share:
-    """A share with the intervals that hold for it."""
+    """A share with its valid intervals."""
     if sequential:
         return Share(count, total, of, {SEQUENTIAL: sequential_rate(count, total)})
     both = {WILSON: rate(count, total), EXACT: rate(count, total, "exact")}

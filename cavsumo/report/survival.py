@@ -30,10 +30,10 @@ class RunOf(NamedTuple):
 
 @dataclass(frozen=True)
 class TimeToTest(Told):
-    """When tests come.
+    """The times of tests.
 
     Attributes:
-        tests, censored: how many episodes ended with a test, how many without.
+        tests, censored: numbers of episodes with and without a test.
         median: the time by which half of the episodes would have had a test [s]; None when fewer
             have one before the last is censored.
         median_interval: its 95 % interval [s], where the curve's interval crosses one half
@@ -59,7 +59,7 @@ class TimeToTest(Told):
 
 
 def times_to_test(groups: Sequence[Group]) -> list[TimeToTest]:
-    """One estimate a group, with a common limit for the means."""
+    """One estimate per group, with a common limit for the means."""
     curves = [kaplan_meier(*times_and_events(group.valid)) for group in groups]
     limit = min((float(curve.times[-1]) for curve in curves if curve is not None), default=None)
     return [_estimate(group, curve, limit) for group, curve in zip(groups, curves, strict=True)]
@@ -73,7 +73,7 @@ def times_and_events(valid: pandas.DataFrame) -> tuple[NDArray[np.float64], NDAr
 
 
 def _estimate(group: Group, curve: Curve | None, limit: float | None) -> TimeToTest:
-    """What is said of one group."""
+    """The estimate of one group."""
     valid = group.valid
     tests = int(EVENTS["tests"](valid).sum())
     middle, around = median_time_to_test(curve) if curve is not None else (None, None)

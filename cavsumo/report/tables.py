@@ -19,7 +19,7 @@ from cavsumo.results.kaplan_meier import median_in_words
 
 
 def tables(report: Report) -> Iterator[Table]:
-    """All tables that have anything to say."""
+    """All tables with at least one row."""
     labels = Labels(report)
     yield _batches(report.evidence.batches, report)
     if not report.groups:
@@ -37,7 +37,7 @@ def tables(report: Report) -> Iterator[Table]:
 
 
 def _batches(batches: Sequence[Batch], report: Report) -> Table:
-    """What was read."""
+    """The files that were read."""
     counts = report.evidence.rows["batch"].value_counts()
     rows = []
     for i, batch in enumerate(batches):
@@ -53,7 +53,7 @@ def _batches(batches: Sequence[Batch], report: Report) -> Table:
 
 
 def _batch_notes(batches: Sequence[Batch]) -> Iterator[str]:
-    """What is special about them."""
+    """Notes on special batches."""
     for batch in batches:
         if batch.sequential:
             reason = batch.manifest.get("stopped_by")
@@ -121,7 +121,7 @@ def _driving(found: Sequence[EgoDriving], labels: Labels) -> Table:
 
 
 def _blame(found: Sequence[Rates], labels: Labels) -> Table:
-    """Which rules were broken first where the ego failed."""
+    """The rules broken first in failures."""
     methods = _methods(found)
     rows = [
         [*labels.cells(one), rule, *_share(share, methods)]
@@ -135,7 +135,7 @@ def _blame(found: Sequence[Rates], labels: Labels) -> Table:
 
 
 def _methods(found: Sequence[Rates]) -> list[str]:
-    """By which methods there are intervals."""
+    """The methods of the intervals."""
     used = {method for one in found for method in one.tests.intervals}
     return [method for method in (WILSON, EXACT, SEQUENTIAL) if method in used]
 
@@ -147,7 +147,7 @@ def _share(share: Share, methods: Sequence[str]) -> list[str]:
 
 
 def _comparisons(report: Report, labels: Labels) -> Iterator[Table]:
-    """Who finds more on the same seeds."""
+    """The comparisons on the same seeds."""
     words = [title for title in labels.titles if title == "setting"]
     words += ["agent"] if report.by != "agent" else []
     numbers = ("pairs", "only first", "only second", "ratio", "95 % interval", "p", "p (Holm)")
@@ -161,7 +161,7 @@ def _comparisons(report: Report, labels: Labels) -> Iterator[Table]:
 
 
 def _comparison(one: PairedComparison, words: Sequence[str]) -> list[str]:
-    """One line of them."""
+    """One row of the comparison table."""
     who = [getattr(one, word) for word in words]
     return [
         *who,
@@ -230,7 +230,7 @@ def _run(first: RunOf | None, several: bool) -> str:
 
 
 def _effort(report: Report, labels: Labels) -> Table:
-    """What tests and failures cost."""
+    """The rates of tests and failures per second."""
     rows = []
     for rate, one in zip(report.rates, report.efforts, strict=True):
         for what in report.events:
@@ -251,6 +251,6 @@ def _effort_cells(found: PerSecond) -> list[str]:
 
 
 def _total(efforts: Sequence[Effort]) -> str:
-    """How long it all took."""
+    """The total times."""
     simulated, real = sum(e.simulated_s for e in efforts), sum(e.real_s for e in efforts)
     return f"{simulated:,.0f} s were simulated in {real:,.1f}"

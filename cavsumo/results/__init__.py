@@ -1,7 +1,7 @@
-"""What is left of episodes: columns, rows, traces and manifests, written and read.
+"""The results of episodes: columns, rows, traces and manifests, written and read.
 
-``writing`` writes a batch, ``reading`` reads it, ``provenance`` says what identifies it. Nothing
-here plays an episode. To add a column: an entry in ``columns``, and the table of docs/results.md by
+``writing`` writes a batch, ``reading`` reads it, ``provenance`` identifies it. No file here plays
+an episode. To add a column: an entry in ``columns``, and the table of docs/results.md by
 ``columns.markdown_table``.
 """
 

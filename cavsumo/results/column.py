@@ -1,4 +1,4 @@
-"""A column of results.csv, and the finished episode that its values are made from."""
+"""A column of results.csv, and the finished episode from which its values are made."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from cavsumo.model.scenario import BatchPlan
 
-if TYPE_CHECKING:  # the process that collects rows loads no SUMO
+if TYPE_CHECKING:  # the process that collects rows does not load SUMO
     from cavsumo.simulation.avoidability import Avoidability
     from cavsumo.simulation.loop import Episode
 
@@ -21,9 +21,9 @@ class FinishedEpisode:
         plan: of its batch.
         run, agent, seed: its number in the batch, the tester agent's label, its seed.
         fresh: it was played in a simulation of its own.
-        episode: what happened; None if it could not be played.
-        avoidability: what the reference driver would have done; None if that was not asked.
-        error: why it could not be played, empty if it was.
+        episode: the episode; None if it could not be played.
+        avoidability: the judgement by the reference driver; None if not requested.
+        error: the reason why it could not be played, empty if it was.
     """
 
     plan: BatchPlan
@@ -42,10 +42,10 @@ class Column:
 
     Attributes:
         name: as in the header; ends with the unit where there is one.
-        meaning: what a cell says, and when it is empty.
+        meaning: the meaning of a cell, and when it is empty.
         unit: of its numbers, empty for none.
-        value: what the cell of a finished episode holds; None for nothing.
-        words: it holds words, not numbers.
+        value: the cell of a finished episode; None for an empty one.
+        words: its cells are words, not numbers.
     """
 
     name: str
@@ -62,7 +62,7 @@ class Column:
 
 @dataclass(frozen=True)
 class Measured:
-    """A value that the episode alone tells, whatever batch it is of.
+    """A value that depends on the episode alone, not on its batch.
 
     Attributes:
         of: the value of an episode.

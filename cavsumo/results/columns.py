@@ -1,7 +1,7 @@
 """The columns of results.csv, each one entry: its name, meaning, unit and value.
 
 The row, the header, the explanations in the manifest and the table of docs/results.md are made
-from ``COLUMNS``; whatever reads results knows the columns by their names here.
+from ``COLUMNS``; readers of results use the names of this list.
 """
 
 from __future__ import annotations
@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING, Any
 
-from cavsumo.assertions.base import INVALID, VIOLATED, Judgement
+from cavsumo.assertions.judgement import INVALID, VIOLATED, Judgement
 from cavsumo.results.column import Column, FinishedEpisode, Measured
 
 if TYPE_CHECKING:
@@ -46,9 +46,9 @@ def markdown_table() -> str:
 
 
 def _judgement(episode: Episode) -> Judgement:
-    """What the row says was judged; of an invalid episode only who made it so.
+    """The judgement of the row; for an invalid episode only the responsible tester.
 
-    What the assertions said of that is in ``verdicts``.
+    The assertions' own verdicts are in ``verdicts``.
     """
     if episode.invalid and episode.breach:
         return Judgement("", INVALID, episode.breach.tester)
@@ -61,23 +61,23 @@ def _judged(value: Callable[[Judgement], Any], unplayed: Any = None) -> Measured
 
 
 def _robustness(said: Judgement) -> float | None:
-    """The robustness as the CSV has it: rounded, what is violated stays below zero."""
+    """The robustness for the CSV: rounded, but negative for a violation."""
     value = said.robustness
     return min(value, -0.001) if value is not None and said.verdict == VIOLATED else value
 
 
 def verdicts_cell(verdicts: Mapping[str, str]) -> str:
-    """What every assertion said, as one cell; ``rows.verdicts_of`` takes it apart."""
+    """All verdicts as one cell; ``rows.verdicts_of`` parses it."""
     return " ".join(f"{name}={verdict}" for name, verdict in verdicts.items())
 
 
 def _foretold(value: Callable[[Forecast], Any], none: Any = None) -> Measured:
-    """A value of what the tester said beforehand."""
+    """A value of the tester's forecast."""
     return Measured(lambda episode: value(episode.forecast) if episode.forecast else none)
 
 
 def _with_ego(episode: Episode) -> int:
-    """How many collisions with the ego SUMO reported."""
+    """The number of collisions with the ego that SUMO reported."""
     return sum("ego" in pair for pair in episode.sumo_collisions)
 
 
@@ -87,17 +87,17 @@ def _driven(value: Callable[[EgoProgress], Any]) -> Measured:
 
 
 def _retried(value: Callable[[Avoidability], Any]) -> Callable[[FinishedEpisode], Any]:
-    """A value of what the reference driver would have done."""
+    """A value of the judgement by the reference driver."""
     return lambda done: None if done.avoidability is None else value(done.avoidability)
 
 
 def _avoidable(found: Avoidability) -> int | None:
-    """Whether it would have avoided the violation, as 1 or 0."""
+    """Whether the reference driver would have avoided the violation, as 1 or 0."""
     return None if found.avoidable is None else int(found.avoidable)
 
 
 def _later(_: FinishedEpisode) -> None:
-    """Nothing yet: known only when the row is written."""
+    """None: the value is known only when the row is written."""
 
 
 _ALL = (

@@ -1,8 +1,8 @@
-"""Failures in the order in which they matter: what a careful driver would have prevented first.
+"""Failures in order of importance: preventable ones first.
 
 A failure is an episode in which the ego violated an assertion. It is *preventable* if the reference
-driver would have avoided it, *unpreventable* if not (UN R157), *not judged* if that was not asked
-or could not be told.
+driver would have avoided it, *unpreventable* if not (UN R157), *not judged* if that was not
+requested or not possible.
 """
 
 from __future__ import annotations
@@ -19,10 +19,10 @@ AnyRow = TypeVar("AnyRow", bound=Mapping[str, Any])
 
 
 def failure_kind(row: Mapping[str, Any]) -> str:
-    """Which kind of failure an episode is, empty for none.
+    """The kind of failure of an episode, empty for none.
 
     Args:
-        row: as it was made, as text, or from a table whose numbers are floats (NaN for none).
+        row: as made, as text, or from a table whose numbers are floats (NaN for none).
     """
     if not is_failure(row):
         return ""

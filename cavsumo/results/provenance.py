@@ -1,4 +1,4 @@
-"""What identifies the batch that results are of: its plan, files, versions, and SUMO's options."""
+"""The identity of a batch: its plan, files, versions, and SUMO's options."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from cavsumo.model.checksums import checksum
 from cavsumo.model.scenario import Scenario
 from cavsumo.network.site import Site
 
-# Settings that say how much of a batch to play and not what its episodes are.
+# Settings that determine how much of a batch is played, not its episodes.
 EXTENT = frozenset(
     {"runs", "deadline_s", "first", "until_tests", "until_half_width", "until_rate", "budget_s"}
 )
@@ -34,7 +34,7 @@ def checksums(scenario: Scenario, agent_files: Iterable[Path]) -> dict[str, str]
 
 
 def versions() -> dict[str, str]:
-    """The versions of what the results depend on."""
+    """The versions of the packages on which results depend."""
     packages = ("libsumo", "sumolib", "numpy", "shapely")
     return {"cavsumo": __version__, "python": platform.python_version()} | {
         name: importlib.metadata.version(name) for name in packages
@@ -42,7 +42,7 @@ def versions() -> dict[str, str]:
 
 
 def traffic_checksum(site: Site) -> dict[str, str]:
-    """The SHA-256 of the background traffic that was drawn, if any."""
+    """The SHA-256 of drawn background traffic, if any."""
     if site.demand is None:
         return {}
     return {"traffic": hashlib.sha256(site.demand.encode()).hexdigest()}
@@ -51,7 +51,7 @@ def traffic_checksum(site: Site) -> dict[str, str]:
 def differences(
     first: Mapping[str, Any], second: Mapping[str, Any], *, apart: frozenset[str] = EXTENT
 ) -> Iterator[str]:
-    """What makes two manifests those of different batches, in words, some settings apart."""
+    """The differences of two manifests as batches, in words, without some settings."""
     plans = [dict(m.get("plan") or {}) for m in (first, second)]
     scenarios = [plan.pop("scenario", {}) for plan in plans]
     for name, (was, is_) in (*unequal(*scenarios), *unequal(*plans)):
@@ -61,18 +61,18 @@ def differences(
 
 
 def changes(recorded: Mapping[str, Any], now: Mapping[str, Any]) -> Iterator[str]:
-    """What changed around a plan that stayed the same: versions, files, SUMO's options."""
+    """The changes around an unchanged plan: versions, files, SUMO's options."""
     for part in ("versions", "sha256", "sumo_options"):
         for name, (was, is_) in unequal(recorded.get(part) or {}, now[part]):
             if part == "sha256" and was is None:
-                continue  # the ego wrote it since; it was no input
+                continue  # the ego wrote it since; it was not an input
             yield f"{part}: {name} was {was}, is {is_}"
 
 
 def unequal(
     first: Mapping[str, Any], second: Mapping[str, Any]
 ) -> Iterator[tuple[str, tuple[Any, Any]]]:
-    """The keys with different values, and the values; None where there is none."""
+    """The keys with different values, and the values; None for a missing one."""
     for key in {**first, **second}:
         if first.get(key) != second.get(key):
             yield key, (first.get(key), second.get(key))

@@ -15,18 +15,18 @@ if TYPE_CHECKING:
     import pandas
 
 FORMAT = "cavsumo-results-1"
-STARTING = "starting"  # a manifest that says so owns none of the rows that lie beside it
-COMPLETE = ("finished", "stopped", STARTING)  # the statuses of which no row would be missed
+STARTING = "starting"  # the rows beside a manifest with this status belong to an earlier batch
+COMPLETE = ("finished", "stopped", STARTING)  # the statuses of complete batches
 HEADER = ",".join(COLUMNS) + "\n"
 
 
 def trace_name(csv_file: Path, run: int) -> str:
-    """Where the trace of an episode lies, relative to the results file."""
+    """The path of an episode's trace, relative to the results file."""
     return f"{csv_file.stem}/run{run:06d}.jsonl"
 
 
 def ego_log_name(csv_file: Path, run: int) -> str:
-    """Where lies what the ego printed in an episode, relative to the results file."""
+    """The path of the ego's output in an episode, relative to the results file."""
     return f"{csv_file.stem}/run{run:06d}.ego.log"
 
 
@@ -60,7 +60,7 @@ def read_manifest(csv_file: Path) -> dict[str, Any]:
 
 
 def check_replaceable(csv_file: Path) -> None:
-    """Raise ResultsError unless a new batch may take the place of what lies there."""
+    """Raise ResultsError unless a new batch may replace the existing files."""
     name, file = f"results {str(csv_file)!r}", csv_file.with_suffix(".json")
     rows = csv_file.is_file() and csv_file.stat().st_size > 0
     if not rows and not file.exists():

@@ -1,6 +1,6 @@
-"""What an episode leaves: its row in the CSV, and the trace beside it as text.
+"""The results of an episode: its row in the CSV, and the trace beside it as text.
 
-Both are made where the episode was played, so that the process that collects them only writes.
+Both are made in the simulating process, so that the collecting process only writes.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from cavsumo.assertions.base import HELD, VIOLATED
+from cavsumo.assertions.judgement import HELD, VIOLATED
 from cavsumo.results.columns import COLUMNS, Row
 
 
@@ -22,8 +22,8 @@ class Outcome:
 
     Attributes:
         row: its row, by column.
-        trace: the frames worth keeping as JSON lines, empty for none.
-        ego_log: what an ego from outside printed, which may differ from run to run; mostly empty.
+        trace: the frames to keep as JSON lines, empty for none.
+        ego_log: the output of an external ego, which may differ from run to run; mostly empty.
     """
 
     row: Row
@@ -32,7 +32,7 @@ class Outcome:
 
 
 def cell(value: Any) -> str:
-    """A value as it stands in the CSV: empty for nothing, floats to three decimals.
+    """A value in the CSV: empty for None, floats to three decimals.
 
     Line breaks become spaces: a row is a line, so a torn one shows.
     """
@@ -52,7 +52,7 @@ def row_line(row: Mapping[str, Any]) -> str:
 
 
 def verdicts_of(row: Mapping[str, Any]) -> dict[str, str]:
-    """What every assertion said of an episode; nothing where that was not recorded."""
+    """The verdict of every assertion on an episode; empty if not recorded."""
     said = str(row.get("verdicts") or "").split()
     return {name: verdict for name, _, verdict in (word.rpartition("=") for word in said)}
 

@@ -37,7 +37,7 @@ def rate(count: int, total: int, method: Literal["wilson", "exact"] = "wilson") 
 
     Args:
         method: "wilson" (Wilson 1927: right on average) or "exact" (Clopper and Pearson 1934:
-            holds the share at least so often), both by scipy.
+            contains the share at least as often), both by scipy.
     """
     if total == 0:
         return Rate(count, total, None, None, None)
@@ -54,8 +54,8 @@ def lower_bound(count: int, total: int, confidence: float) -> float:
 
         P(X >= count | p) = 1 - confidence,   X ~ Bin(total, p);   0 for count = 0
 
-    With a number of trials fixed before, the bound lies above the true probability at most so
-    often as 1 - confidence, whatever that probability is.
+    With a number of trials fixed before, the bound is above the true probability with probability
+    at most 1 - confidence, for every such probability.
     """
     if count == 0:
         return 0.0
@@ -65,7 +65,7 @@ def lower_bound(count: int, total: int, confidence: float) -> float:
 
 
 def sequential_rate(count: int, total: int, level: float = 0.95) -> Rate:
-    """The share of count among total, with an interval that holds however one decides to stop.
+    """The share of count among total, with an interval that is valid at any stopping time.
 
     The beta-binomial confidence sequence (Robbins 1970, Ann. Math. Stat. 41, 1397; Howard et al.
     2021, Ann. Stat. 49, 1055): with independent trials of probability p the ratio of the mixed
@@ -87,7 +87,7 @@ def sequential_rate(count: int, total: int, level: float = 0.95) -> Rate:
 
 
 def sequential_p(count: int, total: int, p: float = 0.5) -> float:
-    """The p-value of the hypothesis that the probability is p, valid whenever one stops.
+    """The p-value of the hypothesis that the probability is p, valid at any stopping time.
 
     One over the same martingale (Ville): small at any time with at most that probability.
     """

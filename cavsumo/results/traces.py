@@ -1,7 +1,8 @@
-"""Traces: what happened in an episode, and all that is needed to play it again elsewhere.
+"""Traces: the record of an episode, with all data for playing it again on another machine.
 
 JSON lines. The first is the head: the row, the plan, what the agents knew before, the checksums of
-the files, the versions, and the boxes of all bodies. Then one frame a timestep. The head holds
+the files, the versions, the boxes of all bodies, where the testers started, and who of the
+background departed. Then one frame a timestep, with what the testers chose then. The head holds
 nothing that says how much of a batch was played, so a trace is the same in every shard.
 """
 
@@ -11,22 +12,25 @@ import itertools
 import json
 import math
 import re
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence, Set
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, NamedTuple
 
+from cavsumo.agents.recorded import Recorded
 from cavsumo.errors import ResultsError
-from cavsumo.model.bodies import Body
+from cavsumo.model.bodies import Action, Body
 from cavsumo.model.scenario import BatchPlan
 from cavsumo.model.snapshot import BodyState, Snapshot
 from cavsumo.network.site import Site
 from cavsumo.results.columns import COLUMNS, Row
 from cavsumo.results.provenance import EXTENT, traffic_checksum, versions
+from cavsumo.results.recording import recording, recording_head
 from cavsumo.results.rows import cell
 from cavsumo.sumo.options import OPTIONS
 
-FORMAT = "cavsumo-trace-1"
+FORMAT = "cavsumo-trace-2"
+FORMATS = ("cavsumo-trace-1", FORMAT)  # the first has neither starts, actions nor departures
 FRAME_KEYS = {"step", "time_s", "ego", "steering", "testers", "background"}
 # Columns that a replay does not reproduce: real time, and the file beside the row.
 NOT_REPLAYED = ("wall_s", "trace")
@@ -47,7 +51,7 @@ class Shape(NamedTuple):
 
 @dataclass(frozen=True)
 class Trace:
-    """An episode as it was recorded.
+    """A recorded episode.
 
     Attributes:
         head: all but the frames, see ``trace_head``.
@@ -58,8 +62,17 @@ class Trace:
     frames: Sequence[Mapping[str, Any]]
 
     @property
+    def has_recording(self) -> bool:
+        """Whether it holds what was done and not only where everybody was."""
+        return bool(self.head["format"] != FORMATS[0])
+
+    def recording(self) -> Recorded:
+        """The data for playing the episode back; raises ResultsError where they are damaged."""
+        return recording(self.head, self.frames)
+
+    @property
     def row(self) -> dict[str, str]:
-        """The row of the episode as text, without what no replay reproduces."""
+        """The row of the episode as text, without the columns that a replay does not reproduce."""
         return dict(self.head["row"])
 
     def shapes(self) -> dict[str, Shape]:
@@ -70,7 +83,7 @@ class Trace:
 
 
 def origin(plan: BatchPlan, site: Site, inputs: Mapping[str, str]) -> dict[str, Any]:
-    """What the episodes of a plan have in common, for the heads of their traces.
+    """The common part of the heads of a plan's traces.
 
     ``inputs``: the checksums of its files.
     """
@@ -83,13 +96,18 @@ def origin(plan: BatchPlan, site: Site, inputs: Mapping[str, str]) -> dict[str, 
 
 
 def trace_head(
-    origin: Mapping[str, Any], row: Row, memory: Any, snapshots: Iterable[Snapshot]
+    origin: Mapping[str, Any],
+    row: Row,
+    memory: Any,
+    snapshots: Iterable[Snapshot],
+    played: Recorded,
 ) -> dict[str, Any]:
     """The first line of a trace.
 
     Args:
         origin: see the function of that name.
         memory: what the agents knew before; left out, and said so, when it is large.
+        played: what it takes to play the episode back.
     """
     known = len(json.dumps(memory)) <= MEMORY_MOST
     return {
@@ -99,11 +117,12 @@ def trace_head(
         "memory": memory if known else None,
         "memory_kept": known,
         "bodies": _bodies(snapshots),
+        **recording_head(played),
     }
 
 
 def _bodies(snapshots: Iterable[Snapshot]) -> list[dict[str, Any]]:
-    """Everybody in the order of appearance, those with the same box together."""
+    """All bodies in the order of appearance, those with the same box together."""
     met: dict[str, Body] = {}
     for snapshot in snapshots:
         for body in (snapshot.ego.body, *(t.body for t in snapshot.testers)):
@@ -117,8 +136,11 @@ def _bodies(snapshots: Iterable[Snapshot]) -> list[dict[str, Any]]:
     return [{"box": list(shape), "ids": names} for shape, names in alike.items()]
 
 
-def frame(snapshot: Snapshot) -> dict[str, Any]:
-    """A snapshot as one line of a trace: every body as [x, y, v, o], in full precision."""
+def frame(snapshot: Snapshot, actions: Sequence[Action] = ()) -> dict[str, Any]:
+    """A snapshot as one line of a trace: every body as [x, y, v, o], in full precision.
+
+    ``actions``: what the testers' bodies did then, [throttle, steering] each; none at the end.
+    """
     return {
         "step": snapshot.step,
         "time_s": snapshot.time,
@@ -127,6 +149,7 @@ def frame(snapshot: Snapshot) -> dict[str, Any]:
         "testers": {t.id: _pose(t) for t in snapshot.testers},
         "background": {b.id: _pose(b) for b in snapshot.background},
         "lights": "".join(snapshot.lights),
+        "actions": [list(action) for action in actions],
     }
 
 
@@ -135,7 +158,7 @@ def _pose(state: BodyState) -> list[float]:
 
 
 def states(frame: Mapping[str, Any]) -> Iterator[tuple[str, str, list[float]]]:
-    """Everybody in a frame: part (ego, tester or background), id and [x, y, v, o]."""
+    """All bodies in a frame: part (ego, tester or background), id and [x, y, v, o]."""
     yield "ego", "ego", frame["ego"]
     for part, key in (("tester", "testers"), ("background", "background")):
         for name, state in frame[key].items():
@@ -151,34 +174,53 @@ def read_trace(file: Path) -> Trace:
     """The trace in a file; raises ResultsError in one sentence."""
     try:
         return parsed(file.read_text(encoding="utf-8"))
+    except UnknownFormat as error:
+        raise ResultsError(f"trace {str(file)!r}: {error}") from error
     except OSError as error:
         raise ResultsError(f"trace {str(file)!r}: cannot be read: {error.strerror}") from error
     except (ValueError, TypeError, AttributeError) as error:
         raise ResultsError(f"trace {str(file)!r}: cannot be read: {error}") from error
 
 
+class UnknownFormat(ValueError):
+    """A trace of a format that this version does not read."""
+
+
 def parsed(text: str) -> Trace:
-    """The trace that a text holds; raises ValueError and the like when it holds none."""
+    """The trace in a text; raises ValueError and the like for invalid text."""
     first, *lines = text.splitlines() or [""]
-    found = json.loads(first)
-    if not (isinstance(found, dict) and found.get("format") == FORMAT):
-        raise ValueError(f"line 1 is not the head of a {FORMAT}")
-    return Trace(found, [_frame(line) for line in lines])
+    head = _head(first)
+    keys = FRAME_KEYS if head["format"] == FORMATS[0] else FRAME_KEYS | {"actions"}
+    return Trace(head, [_frame(line, keys) for line in lines])
+
+
+def _head(line: str) -> dict[str, Any]:
+    """The first line of a trace; raises UnknownFormat for a format that is not read."""
+    found = json.loads(line)
+    if not (isinstance(found, dict) and isinstance(found.get("format"), str)):
+        raise ValueError("line 1 is not the head of a trace")
+    if found["format"] not in FORMATS:
+        said, known = " ".join(found["format"].split())[:40], " and ".join(FORMATS)
+        raise UnknownFormat(f"format {said}, this version reads {known}")
+    return found
 
 
 def read_moments(file: Path, times: Sequence[float]) -> list[tuple[float, dict[str, Any]]]:
-    """For each time [s] the nearest frame of a trace, and how far the ego has driven by then [m].
+    """For each time [s] the nearest frame of a trace, and the ego's distance driven by then [m].
 
-    Only those frames are parsed as a whole: traces are long, and a report reads thousands.
+    Only those frames are parsed completely, because traces are long and a report reads thousands.
     """
     try:
         with file.open(encoding="utf-8") as stream:
-            lines = stream.readlines()[1:]  # the first is the head
+            first, *lines = stream.readlines() or [""]
+        _head(first)
         passing = list(map(_passing, lines))
         steps = (math.dist(a[1:], b[1:]) for a, b in itertools.pairwise(passing))
         driven = list(itertools.accumulate(steps, initial=0.0))
         nearest = [min(range(len(lines)), key=lambda i: abs(passing[i][0] - t)) for t in times]
         return [(driven[i], _frame(lines[i])) for i in nearest]
+    except UnknownFormat as error:
+        raise ResultsError(f"trace {str(file)!r}: {error}") from error
     except (OSError, ValueError, TypeError) as error:
         raise ResultsError(f"trace {str(file)!r}: cannot be read: {error}") from error
 
@@ -195,12 +237,21 @@ def _passing(line: str) -> tuple[float, float, float]:
     return time, x, y
 
 
-def _frame(line: str) -> dict[str, Any]:
-    """A line of a trace."""
+def _frame(line: str, keys: Set[str] = FRAME_KEYS) -> dict[str, Any]:
+    """A line of a trace, which has at least some keys."""
     found: dict[str, Any] = json.loads(line)
-    if not set(found) >= FRAME_KEYS:
-        raise ValueError(f"a frame without {', '.join(sorted(FRAME_KEYS - set(found)))}")
+    if not found.keys() >= keys:
+        raise ValueError(f"a frame without {', '.join(sorted(keys - found.keys()))}")
     for _, name, state in states(found):
-        if len(state) != 4 or not all(isinstance(value, int | float) for value in state):
+        if not _numbers(state, 4):
             raise ValueError(f"step {found['step']}: {name} is {state!r}, expected [x, y, v, o]")
+    for action in found["actions"] if "actions" in keys else ():
+        if not _numbers(action, 2):
+            said = f"action {action!r}, expected [throttle, steering]"
+            raise ValueError(f"step {found['step']}: {said}")
     return found
+
+
+def _numbers(found: Any, count: int) -> bool:
+    """Whether something is so many numbers."""
+    return len(found) == count and all(isinstance(value, int | float) for value in found)

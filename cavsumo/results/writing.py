@@ -1,8 +1,8 @@
-"""Results on disk, written so that whatever happens, what stands there is whole.
+"""Results on disk, complete at every moment.
 
-The results file is locked while a batch writes it. Every row is one write, its trace (and what the
-ego printed) is there before it, and the manifest is replaced as a whole. A process that is killed
-leaves at most one torn row at the end, which ``resume`` takes off again; a full disk leaves none.
+The results file is locked while a batch writes it. Every row is one write, after its trace (and the
+ego's output), and the manifest is replaced atomically. A process that is killed leaves at most one
+torn row at the end, which ``resume`` takes off again; a full disk leaves none.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ from cavsumo.results.reading import (
 from cavsumo.results.rows import Outcome, row_line
 
 RUNNING = "running"
-UNENCODABLE = "backslashreplace"  # file names may hold what is no Unicode
+UNENCODABLE = "backslashreplace"  # file names may contain invalid Unicode
 
 
 class Recorder:
@@ -60,14 +60,14 @@ class Recorder:
         return self
 
     def __exit__(self, *_: object) -> None:
-        if self._created and not self._begun:  # nothing was begun: leave nothing behind
+        if self._created and not self._begun:  # no batch was begun: remove the created file
             self.csv_file.unlink(missing_ok=True)
         self._file.close()
 
     def begin(self, manifest: Mapping[str, Any], *, overwrite: bool = False) -> None:
         """Start a batch in place of a finished one; raises ResultsError if that fails.
 
-        What is not finished, or not ours, is only overwritten when asked for.
+        Unfinished results and other files are only overwritten on request.
         """
         if not overwrite:
             check_replaceable(self.csv_file)
@@ -84,7 +84,7 @@ class Recorder:
             ) from error
 
     def resume(self, manifest: Mapping[str, Any], todo: Iterator[int]) -> Iterator[dict[str, str]]:
-        """Go on behind the rows that are there, yielding them; call until exhausted.
+        """Continue after the existing rows, and yield them; call until exhausted.
 
         Args:
             manifest: the recorded one, with what has changed since.
@@ -120,7 +120,7 @@ class Recorder:
         return row
 
     def replace(self, outcomes: Mapping[int, Outcome]) -> None:
-        """Put other rows in the place of some, all at once or not at all."""
+        """Replace some rows, all at once or not at all."""
         rows = {run: self._with_trace(outcome) for run, outcome in outcomes.items()}
         new_file = self.csv_file.with_name(f".{self.csv_file.name}.new")
         new_file.unlink(missing_ok=True)
@@ -143,7 +143,7 @@ class Recorder:
         self._size = self.csv_file.stat().st_size
 
     def checkpoint(self, facts: Mapping[str, Any]) -> None:
-        """Note facts in the manifest of the running batch."""
+        """Record facts in the manifest of the running batch."""
         self.manifest.update(facts)
         try:
             self._write_manifest(RUNNING)
@@ -168,7 +168,7 @@ class Recorder:
         return row | {"trace": name} if outcome.trace else row
 
     def _put(self, name: str, text: str) -> bool:
-        """Write a file beside the rows, none if there is no text; whether one was there before."""
+        """Write a file beside the rows, none without text; returns whether one existed."""
         file = self.csv_file.parent / name
         there = self._has_folder and file.exists()
         if there:
@@ -185,7 +185,7 @@ class Recorder:
         return there
 
     def _whole_rows(self, todo: Iterator[int]) -> Iterator[dict[str, str]]:
-        """The rows that are there, which must be those that the batch begins with."""
+        """The existing rows, which must be the first ones of the batch."""
         for line, row in whole_lines(self.csv_file):
             if row is not None:
                 expected = next(todo, None)
@@ -229,14 +229,14 @@ class Recorder:
             raise
 
     def _no_more(self, error: OSError) -> BatchError:
-        """What to say when the disk takes no more."""
+        """The error for a full disk."""
         return BatchError(
             f"results {str(self.csv_file)!r}: cannot be written: {error.strerror}; "
             "the rows before are whole, --resume goes on from there"
         )
 
 
-_FRAME = ("format", "status", "columns")  # what the recorder itself adds to a manifest
+_FRAME = ("format", "status", "columns")  # keys that the recorder itself adds to a manifest
 
 
 def check_free(csv_file: Path) -> None:

@@ -1,9 +1,10 @@
-"""Could a violation have been avoided? The episode again, with a reference driver who takes over.
+"""Avoidability of a violation: the episode again, with a reference driver that takes over.
 
 Each rerun is the episode from its start in a simulation of its own. Until the takeover every
-snapshot must equal the recorded one. The testers do what they did, whatever the ego does now, and
-keep their velocities behind the end of the record: it is the ego that is judged, against what it
-met (recorded trajectories, as in arXiv 2212.08148). Nobody learns from a rerun.
+snapshot must equal the recorded one. The testers repeat their recorded actions, independently of
+the ego, and keep their velocities after the end of the record: the question is how the ego could
+have treated the conflict that it met (recorded trajectories, as in arXiv 2212.08148). No agent
+learns from a rerun.
 """
 
 from __future__ import annotations
@@ -11,24 +12,26 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 from cavsumo.agents.base import Agent
-from cavsumo.agents.recorded import RecordedAgent
+from cavsumo.agents.recorded import Recorded
 from cavsumo.assertions.base import VIOLATED, Assertion, Judgement
 from cavsumo.assertions.contacts import STANDING_MPS, Contact
 from cavsumo.egos.reference import Reference
 from cavsumo.egos.reference.encounter import encounter
 from cavsumo.egos.reference.takeover import Takeover
 from cavsumo.errors import CavsumoError
-from cavsumo.model.bodies import Action
+from cavsumo.model.departures import Demand
 from cavsumo.model.scene import Scene
 from cavsumo.model.snapshot import BodyState, Snapshot
 from cavsumo.model.zone_presence import is_vehicle, ran_into
 from cavsumo.simulation.avoidability_guess import foreseen
-from cavsumo.simulation.loop import Episode, EpisodeLoop
+from cavsumo.simulation.loop import Episode
+from cavsumo.simulation.playback import playback, recorded
 from cavsumo.simulation.setup import Setup
 
-MOST_RERUNS = 6  # a handful; a search that needs more says how far it came
+MOST_RERUNS = 6  # a search that needs more reports its bounds
 STRIDES = (1, 4)  # how far from the last answer the next one is asked for, then halfway [timesteps]
 NOTABLE_MPS = 1.5  # less speed lost avoids little
 STILL_MPS = 1e-6  # rounding apart, the ego has come to stand
@@ -53,10 +56,10 @@ class Avoidability:
 
 
 class ContactWatch(Assertion):
-    """What a rerun is about: from the takeover on the moving ego touches nobody.
+    """The assertion of a rerun: from the takeover on the moving ego touches no body.
 
     A body that touches the standing ego, or a vehicle that runs into the side or rear of a moving
-    one, is no failure of the driver. Nor is whom the original touched before.
+    one, is no failure of the driver; nor is a body that the original touched before.
 
     Args:
         since: the timestep of the takeover.
@@ -92,7 +95,9 @@ class AvoidabilityCheck:
         setup, agents, seed: with which it was played.
         record: whether everybody was shown in its snapshots.
         episode: what happened; its frames and actions were kept.
-        beat: called before each rerun, so that whoever waits knows that it goes on.
+        demand: the departures with which it was played; None for the scenario's own demand, which
+            goes on where a rerun outlasts the episode.
+        beat: called before each rerun, so that a waiting process knows that it continues.
     """
 
     setup: Setup
@@ -101,6 +106,7 @@ class AvoidabilityCheck:
     record: bool
     episode: Episode
     beat: Callable[[], None]
+    demand: Demand | None = None
 
     @property
     def broken(self) -> Assertion:
@@ -190,7 +196,7 @@ class AvoidabilityCheck:
         return [_named(frame, name) for frame in frames]
 
     def _scene(self) -> Scene:
-        """What the encounters are measured in: paths and roads of the site."""
+        """The scene of the encounters: paths and roads of the site."""
         world = self.setup.world
         return self.setup.site.scene(world.dt, world.ego_body, self.setup.bodies, (), self.seed)
 
@@ -202,11 +208,11 @@ class AvoidabilityCheck:
         """
         self.beat()
         episode, broken, watch = self.episode, self.broken, ContactWatch(step)
-        # Whoever is left out of the rerun saw what the first episode showed.
+        # Bodies that the rerun leaves out count with their states of the first episode.
         record = self.record or any(a.sees_background for a in self.setup.assertions)
         ego = Takeover(self.setup.ego, reference, step, drives=episode.drives)
         setup = dataclasses.replace(self.setup, ego=ego, assertions=(broken, watch))
-        rerun = EpisodeLoop(setup, self._playbacks(), self.seed, record=record)
+        rerun = playback(setup, self._recorded, record=record, alike=self.agents)
         by_contact = episode.judgement.impact_speed is not None
         while True:
             now = rerun.snapshot
@@ -227,20 +233,10 @@ class AvoidabilityCheck:
         what = "the ego" if now.ego != recorded.ego else "somebody"
         raise Diverged(f"the episode again is another one: {what} differs at {now.time:.2f} s")
 
-    def _playbacks(self) -> list[RecordedAgent]:
-        """The agents, as they acted."""
-        return [
-            _again([joint[i] for joint in self.episode.actions], agent)
-            for i, agent in enumerate(self.agents)
-        ]
-
-
-def _again(chosen: Sequence[Sequence[Action]], agent: Agent) -> RecordedAgent:
-    """An agent that does again what another did, and looks where that one looked."""
-    again = RecordedAgent()
-    again.remember(chosen)
-    again.sees_background = agent.sees_background
-    return again
+    @cached_property
+    def _recorded(self) -> Recorded:
+        """The episode, to be played back."""
+        return recorded(self.setup, self.episode, self.seed, self.demand)
 
 
 def latest(
@@ -248,7 +244,7 @@ def latest(
 ) -> tuple[int, int]:
     """The last timestep at which a takeover avoids, and the first after it at which none does.
 
-    Assumes that whatever a takeover avoids an earlier one avoids too. Asks at a guess, next to it
+    Assumes that earlier takeovers avoid what a takeover avoids. Asks at a guess, next to it
     and some steps on, then by bisection: a right guess is confirmed by two calls. Where ``most``
     calls are not enough the two are further apart.
 

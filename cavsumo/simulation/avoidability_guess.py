@@ -1,8 +1,7 @@
-"""Where a search for the last chance begins: what a takeover would come to, without a simulation.
+"""The first guess of the last chance: the result of a takeover, predicted without a simulation.
 
-The ego follows the way that it drove, the body does what it did, then keeps its velocity. That is
-what the simulation will do too, but for bends and roundings, so it is a good first guess and
-nothing more.
+The ego follows its recorded way, the body repeats its recorded motion, then keeps its velocity. The
+simulation does the same except in bends and for rounding, so this is only a first guess.
 """
 
 from __future__ import annotations
@@ -16,13 +15,14 @@ from cavsumo.egos.reference.base import Reference
 from cavsumo.model.geometry import Box, overlap
 from cavsumo.model.snapshot import BodyState, Snapshot
 
-PATIENCE_S = 60.0  # a reference driver stands long before
+PATIENCE_S = 60.0  # a reference driver has stopped long before
 
 
 def foreseen(
     frames: Sequence[Snapshot], bodies: Sequence[BodyState], reference: Reference, dt: float
 ) -> int:
-    """The last timestep at which a takeover seems to avoid the contact at the end, -1 for none.
+    """The last timestep at which a takeover is predicted to avoid the contact at the end, -1 for
+    none.
 
     Args:
         frames: up to the contact.
@@ -38,11 +38,11 @@ def foreseen(
 
 
 class DrivenWay:
-    """The way that the ego drove, by arc length; straight on behind its end.
+    """The way that the ego drove, by arc length; straight beyond its end.
 
     Attributes:
         states: the ego at each timestep.
-        driven: how far it had come by then [m].
+        driven: the distance driven by then [m].
     """
 
     def __init__(self, states: Sequence[BodyState]) -> None:
@@ -83,7 +83,7 @@ def _touches(
 
 
 def _box(bodies: Sequence[BodyState], step: int, dt: float) -> Box:
-    """The box of a body, which keeps its velocity behind the end of what is known of it."""
+    """The box of a body, which keeps its velocity after its last known state."""
     if step < len(bodies):
         return bodies[step].box
     x, y, o, length, width = bodies[-1].box

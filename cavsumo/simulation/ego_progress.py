@@ -24,24 +24,24 @@ from cavsumo.model.snapshot import Snapshot
 
 ACCELERATION, DECELERATION = 2.6, 4.5  # m/s2, of the free drive
 GRID_M = 1.0
-LASTING_S = 10.0  # who stands for so long at the end has stopped; who moved for so long is judged
+LASTING_S = 10.0  # standing for so long at the end is a stop; moving for so long is judged
 CRAWL = 4.0  # as many times as long as the free drive is a crawl
 STOOD, CRAWLED = "stood", "crawled"
 
 
 @dataclass(frozen=True)
 class EgoProgress:
-    """What became of the ego's drive.
+    """The progress of the ego.
 
     Attributes:
-        arrived: whether it came to the end of its route; None if the episode was over before it
-            was time.
-        driven: how far it came along its path [m].
-        time: how long the episode took [s].
+        arrived: whether it reached the end of its route; None if the episode ended before the ego
+            could.
+        driven: the distance along its path [m].
+        time: the duration of the episode [s].
         lost: how much of that the free drive to the same place would have saved [s]; negative for
             an ego that is faster; None without speed limits to compare with.
-        stood: how long it stood [s].
-        stood_last: how long it had been standing at the end [s].
+        stood: total time of standing [s].
+        stood_last: time of standing until the end [s].
     """
 
     arrived: bool | None = None
@@ -56,7 +56,7 @@ class EgoProgress:
         """STOOD for an ego that had been standing long, CRAWLED for a slow one, else empty.
 
         It crawled if it needed, while it moved, more than ``CRAWL`` times as long as the free
-        drive. Whether it had a reason (a red light, somebody in its way) is not asked.
+        drive. Reasons (a red light, a body in its way) do not count.
         """
         if self.stood_last >= LASTING_S - 1e-9:
             return STOOD
@@ -66,7 +66,7 @@ class EgoProgress:
 
 
 def ego_progress(scene: Scene, history: Sequence[Snapshot], arrived: bool | None) -> EgoProgress:
-    """What became of the ego's drive in the snapshots of an episode."""
+    """The progress of the ego in the snapshots of an episode."""
     first, last = history[0], history[-1]
     path = scene.ego_path
     begin, end = (path.project(s.ego.x, s.ego.y).along for s in (first, last))

@@ -1,6 +1,6 @@
 """Algorithm 1 of the seed: agents, ego and world, one timestep after another.
 
-The truth about the testers' bodies is integrated here by the kinematics; the world is told.
+The testers' states are integrated here by the kinematics and sent to the world.
 """
 
 from __future__ import annotations
@@ -21,8 +21,9 @@ from cavsumo.assertions.naturalness import Naturalness
 from cavsumo.assertions.validity import Breach, ValidityMonitor
 from cavsumo.egos.base import Drive, Ego
 from cavsumo.errors import AgentError
-from cavsumo.model.bodies import Action, Kind
+from cavsumo.model.bodies import Action
 from cavsumo.model.carriageway import Start
+from cavsumo.model.departures import Demand
 from cavsumo.model.kinematics import step_floats
 from cavsumo.model.scenario import Simulation
 from cavsumo.model.scene import Scene
@@ -30,6 +31,7 @@ from cavsumo.model.seeds import starts_generator
 from cavsumo.model.sensors import Senses
 from cavsumo.model.snapshot import BodyState, Snapshot
 from cavsumo.simulation.ego_progress import EgoProgress, ego_progress
+from cavsumo.simulation.placing import Placed, placed
 from cavsumo.simulation.rewards import Feedback, RewardMonitor
 from cavsumo.simulation.setup import Setup
 
@@ -37,16 +39,18 @@ from cavsumo.simulation.setup import Setup
 OVERTIME_S = 15.0
 
 
-# What all agents chose at one timestep: for each its bodies' actions.
+# The actions of all agents at one timestep: for each agent those of its bodies.
 Joint = Sequence[Sequence[Action]]
 
 
 @dataclass
 class Episode:
-    """What happened, while and after it happens.
+    """The record of an episode, during and after it.
 
     Frames and actions only where they are kept; ``drives``: whether the ego steers itself;
-    ``forecast``: what the testers said of it beforehand.
+    ``forecast``: what the testers said of it beforehand; ``starts``: where they started, and
+    ``waited``: where they were while the ego entered; ``departures``: of the background, None
+    where they were not recorded or do not tell all of it.
     """
 
     judgement: Judgement
@@ -70,17 +74,20 @@ class Episode:
     emergency_stops: int = 0
     frames: list[Snapshot] = field(default_factory=list)
     actions: list[Joint] = field(default_factory=list)
+    starts: tuple[Start, ...] = ()
+    waited: tuple[Start, ...] = ()
+    departures: Demand | None = None
     drives: bool = False
     forecast: Forecast | None = None
 
     @property
     def outcome(self) -> str:
-        """What came out: the verdict, unless a tester broke the rules of the world before it."""
+        """The outcome: the verdict, unless a tester broke the rules of the world before it."""
         return INVALID if self.invalid else self.judgement.verdict
 
 
 class EpisodeLoop:
-    """One episode under way (Algorithm 1).
+    """One running episode (Algorithm 1).
 
     Args:
         agents: one for each team, kept from episode to episode, so that learners learn.
@@ -88,11 +95,12 @@ class EpisodeLoop:
         record: keep every snapshot, and show everybody in it.
         keep: keep every snapshot as it is, and what the agents chose, to play it again.
         simulation: whose it is played in (``World.reset``).
+        demand: departures of the background that were recorded, in place of the scenario's demand.
 
     Attributes:
-        scene: what does not change during the episode.
-        snapshot: the truth now.
-        ego_view, agent_views: what the ego and each agent see of it.
+        scene: the constant part of the episode.
+        snapshot: the true state now.
+        ego_view, agent_views: the views of the ego and of each agent.
         over: whether it has ended.
     """
 
@@ -105,24 +113,26 @@ class EpisodeLoop:
         record: bool = False,
         keep: bool = False,
         simulation: Simulation = "own",
+        demand: Demand | None = None,
     ) -> None:
         self._setup, self._agents, self._record = setup, agents, record or keep
-        self.scene, self.snapshot, self._senses = _reset(setup, agents, seed, record, simulation)
+        self.scene, self._senses, begun = _reset(setup, agents, seed, record, simulation, demand)
+        self.snapshot = begun.snapshot
         self._show(self.snapshot)
         self._rewards = RewardMonitor(self.scene, setup.teams)
-        self._episode = Episode(Judgement(""))
+        self._episode = Episode(Judgement(""), starts=begun.starts, waited=begun.waited)
         self._episode.forecast = _foretold(agents, self.agent_views)
         self._validity = ValidityMonitor(self.scene)
-        self._history: list[Snapshot] = []  # what blame and progress are found from
+        self._history: list[Snapshot] = []  # from which blame and progress are found
         self._arrived = False
         self._learners = any(type(a).process_feedback is not Agent.process_feedback for a in agents)
         self._observe(self.snapshot)
         self._end(_over(setup, self.snapshot))
 
     def step(self) -> Feedback | None:
-        """One timestep: everybody chooses, the world moves on; what the agents earned by it.
+        """One timestep: all choose, the world moves on; returns the agents' rewards.
 
-        None once their game is over, although the episode may go on until all is decided.
+        None once their game is over, although the episode may continue until all assertions decide.
         """
         setup, episode, snapshot, agents = self._setup, self._episode, self.snapshot, self._agents
         scene, views = self.scene, self.agent_views
@@ -154,21 +164,21 @@ class EpisodeLoop:
 
     @property
     def contacts(self) -> ContactMonitor:
-        """Who touched whom so far."""
+        """The contacts so far."""
         return self._episode.contacts
 
     @property
     def judgement(self) -> Judgement:
-        """The most serious of what the assertions say so far."""
+        """The most serious judgement of the assertions so far."""
         return weightiest(self._setup.assertions)
 
     @property
     def outcome(self) -> str:
-        """What came out so far."""
+        """The outcome so far."""
         return INVALID if self._validity.spoils(self.judgement) else self.judgement.verdict
 
     def finished(self) -> Episode:
-        """What happened, or what happened so far."""
+        """The record of the episode, possibly so far."""
         episode = _finished(self._setup, self._episode, self.snapshot, self._rewards)
         episode.rms_acceleration = episode.naturalness.rms_acceleration(
             episode.steps, self.scene.dt
@@ -185,7 +195,7 @@ class EpisodeLoop:
     def _observe(self, snapshot: Snapshot) -> None:
         """Show a snapshot to the monitors and the assertions.
 
-        The testers are watched until an assertion is violated: what follows changes no verdict.
+        The testers are checked until an assertion is violated: later breaches change no verdict.
         """
         episode, assertions = self._episode, self._setup.assertions
         contacts = episode.contacts.observe(snapshot)
@@ -208,7 +218,7 @@ class EpisodeLoop:
                 assertion.conclude()
 
     def _show(self, snapshot: Snapshot) -> None:
-        """Let everybody see a snapshot: all of it, unless there are sensors."""
+        """Make the views of a snapshot: the whole snapshot, unless there are sensors."""
         if self._senses is None:
             self.ego_view, self.agent_views = snapshot, (snapshot,) * len(self._agents)
         else:
@@ -232,26 +242,33 @@ def play(
 
 
 def _reset(
-    setup: Setup, agents: Sequence[Agent], seed: int, record: bool, simulation: Simulation
-) -> tuple[Scene, Snapshot, Senses | None]:
-    """Draw the starts and begin an episode; one generator for each who draws."""
+    setup: Setup,
+    agents: Sequence[Agent],
+    seed: int,
+    record: bool,
+    simulation: Simulation,
+    demand: Demand | None,
+) -> tuple[Scene, Senses | None, Placed]:
+    """Place the testers and begin an episode; one generator for each who draws."""
     streams = np.random.SeedSequence(seed)
     _, electing, *rest = map(np.random.default_rng, streams.spawn(2 + len(agents)))
     scenario = setup.scenario
     placing = starts_generator(seed if scenario.starts_seed is None else scenario.starts_seed)
-    kinds = [body.kind for body in setup.bodies]
-    ego = setup.world.ego_body
-    starts = setup.site.draw(kinds, ego.kind, scenario.start_speed, placing)
     watching: list[Ego | Agent | Assertion] = [setup.ego, *agents, *setup.assertions]
-    # Vehicles keep their distance to whoever is ahead of them, so they see everybody.
-    driving = any(start.approach for start in starts)
-    everything = record or driving or bool(scenario.ego_sensor or scenario.tester_sensor)
+    # Vehicles keep their distance to all bodies ahead of them, so they see everybody.
+    sensors = bool(scenario.ego_sensor or scenario.tester_sensor)
+    everything = record or bool(setup.site.approaches) or sensors
     everything = everything or any(who.sees_background for who in watching)
-    snapshot = setup.world.reset(
-        seed, _states(setup, starts), starts, everything=everything, simulation=simulation
-    )
-    starts, snapshot = _cleared(setup, starts, snapshot, placing)
-    scene = setup.site.scene(setup.world.dt, ego, setup.bodies, starts, seed)
+
+    def reset(states: Sequence[BodyState], starts: Sequence[Start]) -> Snapshot:
+        shown = {"everything": everything, "note": record}
+        return setup.world.reset(
+            seed, states, starts, simulation=simulation, demand=demand, **shown
+        )
+
+    begun = placed(setup, agents, placing, reset)
+    ego = setup.world.ego_body
+    scene = setup.site.scene(setup.world.dt, ego, setup.bodies, begun.starts, seed)
     scene = dataclasses.replace(scene, horizon=scenario.end)
     senses = _senses(setup, scene, streams)
     for agent, team, rng in zip(agents, setup.teams, rest, strict=True):
@@ -260,27 +277,11 @@ def _reset(
     setup.ego.reset(scene)
     for assertion in setup.assertions:
         assertion.reset(scene)
-    return scene, snapshot, senses
-
-
-def _cleared(
-    setup: Setup, starts: tuple[Start, ...], snapshot: Snapshot, rng: np.random.Generator
-) -> tuple[tuple[Start, ...], Snapshot]:
-    """Starts and first snapshot without testers on foot where others are as the ego enters.
-
-    Traffic is there before the testers are drawn, and where it stands depends on the episode.
-    """
-    kinds = [body.kind for body in setup.bodies]
-    near = [snapshot.ego.box, *(other.box for other in snapshot.background)]
-    if not setup.site.blocked(kinds, starts, near):
-        return starts, snapshot
-    taken = [snapshot.ego.box, *(BodyState(*raw).box for raw in setup.world.everybody())]
-    starts = setup.site.cleared(kinds, starts, taken, rng)
-    return starts, setup.world.shift(tuple(_states(setup, starts)))
+    return scene, senses, begun
 
 
 def _foretold(agents: Sequence[Agent], views: Sequence[Snapshot]) -> Forecast | None:
-    """What the agents say of the episode before it: the best that one of them says."""
+    """The agents' forecast of the episode: the best of theirs."""
     said = [agent.forecast(view) for agent, view in zip(agents, views, strict=True)]
     return max((one for one in said if one is not None), default=None, key=Forecast.rank)
 
@@ -297,22 +298,6 @@ def _senses(setup: Setup, scene: Scene, streams: np.random.SeedSequence) -> Sens
     return Senses(scene, ego, testers, setup.teams, seeds)
 
 
-def _states(setup: Setup, starts: Sequence[Start]) -> list[BodyState]:
-    """The testers' first states."""
-
-    wanted = setup.scenario.start_speed
-
-    def speed(kind: Kind, start: Start) -> float:
-        if start.v is not None:
-            return start.v
-        return kind.v_max if wanted is None else min(kind.v_max, wanted)
-
-    return [
-        BodyState(body, start.x, start.y, speed(body.kind, start), start.o)
-        for body, start in zip(setup.bodies, starts, strict=True)
-    ]
-
-
 def _moved(
     testers: tuple[BodyState, ...],
     teams: Sequence[Sequence[int]],
@@ -321,8 +306,8 @@ def _moved(
 ) -> tuple[BodyState, ...]:
     """The testers' next states by the kinematics (seed, eqs 8 to 19).
 
-    A body that stands keeps its very record, and if all do, so does their tuple: by that others
-    know, without a look at the numbers, that nothing has changed.
+    A body that stands keeps the same record object, and if all do, so does their tuple: identity
+    then tells, without comparing numbers, that nothing has changed.
     """
     moved: list[BodyState] = []
     for team, joint in zip(teams, actions, strict=True):
@@ -379,7 +364,7 @@ def _over(setup: Setup, snapshot: Snapshot) -> bool:
 
 
 def _at_end(scene: Scene, snapshot: Snapshot) -> bool:
-    """Whether a freely driving ego has come to the end of its path."""
+    """Whether a freely driving ego has reached the end of its path."""
     ego, path = snapshot.ego, scene.ego_path
     return path.project(ego.x, ego.y).along >= path.length - ego.body.kind.length / 2
 
@@ -396,5 +381,6 @@ def _finished(
     world = setup.world
     episode.sumo_collisions = frozenset(world.collisions)
     episode.teleports, episode.emergency_stops = world.teleports, world.emergency_stops
+    episode.departures = world.departures
     assert math.isfinite(episode.reward)
     return episode

@@ -1,7 +1,7 @@
-"""What the tester spends and earns: the reward R of the seed's game, as a shortest path problem.
+"""The rewards R of the testers' game, a stochastic shortest path problem.
 
-Reaching the goal (the precondition of an assertion) is worth GOAL; time and time on the
-carriageway cost. Everything else, an unfair episode included, is worth nothing.
+Reaching the goal (the precondition of an assertion) earns GOAL; time and time on the carriageway
+cost. Nothing else earns or costs, not even an unfair episode.
 """
 
 from __future__ import annotations
@@ -20,10 +20,10 @@ Feedback = tuple[list[float], bool]  # each agent's reward for a timestep, and w
 
 
 class RewardMonitor:
-    """The account of one episode.
+    """The rewards of one episode.
 
     Attributes:
-        cost: time that the testers' bodies spent on the carriageway, together [s].
+        cost: total time of the testers' bodies on the carriageway [s].
         total: the agents' rewards together, undiscounted.
     """
 
@@ -32,19 +32,19 @@ class RewardMonitor:
         self._dt, self._roads, self._teams = scene.dt, scene.roads, teams
         self._over = False
         self._names = {body.id for body in scene.bodies}
-        # Whether a body is on the carriageway, where that was looked up, and how far from there it
-        # cannot change; asking the map is dear, so it is asked no earlier.
+        # Whether a body is on the carriageway, the place of that check, and the distance from there
+        # within which it cannot change: checks are expensive, so the next one waits until then.
         self._on_road = [False] * len(scene.bodies)
         self._known = [(math.inf, math.inf, 0.0)] * len(scene.bodies)
         self._seen: tuple[BodyState, ...] = ()
-        self._waiting = [-self._dt * TIME_COST] * len(teams)  # with nobody on the road
+        self._waiting = [-self._dt * TIME_COST] * len(teams)  # with no body on the road
 
     def rewards(
         self, successor: Snapshot, judgements: Sequence[Judgement], cheats: Container[str] = ()
     ) -> Feedback | None:
         """Each agent's reward for a timestep and whether the game ends; None once it is over.
 
-        ``cheats``: bodies that broke the rules of the world, who earn nothing by the goal.
+        ``cheats``: bodies that broke the rules of the world, which earn nothing at the goal.
         """
         testers, on_road = successor.testers, self._on_road
         if testers is not self._seen:
@@ -63,7 +63,7 @@ class RewardMonitor:
             for a, team in enumerate(self._teams):
                 rewards[a] -= self._dt * ROAD_COST * sum([on_road[i] for i in team])
         for judgement in judgements:
-            if judgement.tester in self._names:  # somebody reached the goal, or spoilt it
+            if judgement.tester in self._names:  # a body reached the goal or made it impossible
                 self._over = True
                 for a, team in enumerate(self._teams):
                     names = [testers[i].id for i in team]
@@ -74,7 +74,7 @@ class RewardMonitor:
         return rewards, self._over
 
     def lost(self) -> Feedback | None:
-        """The last reward when the ego got away: a dead end for every agent."""
+        """The last reward when the ego has left: a dead end for every agent."""
         if self._over:
             return None
         self._over = True
@@ -83,7 +83,7 @@ class RewardMonitor:
         return rewards, True
 
     def _look_up(self, i: int, body: BodyState) -> None:
-        """Note whether a body's centre is on the carriageway."""
+        """Check whether a body's centre is on the carriageway."""
         if self._roads is None:
             self._known[i] = (body.x, body.y, math.inf)
             return

@@ -1,27 +1,26 @@
-"""The background traffic, read from SUMO no more often than it can matter.
+"""The background traffic, read from SUMO only when it may touch the ego or a tester.
 
-Reading a body costs as much as everything that is then decided about it, and most bodies are far
-from everybody who could touch them. So, unless somebody wants to see all of them (``everything``),
-a body is read again only when it may have come within touch of a *watcher*, the ego or a tester.
+Reading a body costs as much as all computations with it, and most bodies are far from the ego and
+the testers. Unless all bodies are required (``everything``), a body is therefore read again only
+when it may have come within touch of a *watcher*, the ego or a tester.
 
 The bound. Let P be the middle of a body's front edge, the point that SUMO moves. No point of its
 box is farther from P than f = sqrt(length^2 + (width / 2)^2), and no point of a watcher's box
 farther from its centre than its reach r. At a reading, let g be the smallest ``|P - centre| - r``
 over all watchers, less f. From then on
 
-* P moves by at most ``stride = top speed * timestep * stretch + leap`` in a timestep. SUMO lets
-  nobody exceed the type's maxSpeed. ``stretch`` is the largest ratio of a lane's drawn length to
-  the length that SUMO drives, ``leap`` the largest gap between the ends of two linked lanes plus
-  the widest lane: SUMO changes lanes, and corners, in one timestep (see ``Roaming``);
+* P moves by at most ``stride = top speed * timestep * stretch + leap`` in a timestep. In SUMO no
+  body exceeds the type's maxSpeed. ``stretch`` is the largest ratio of a lane's drawn length to the
+  length that SUMO drives, ``leap`` the largest gap between the ends of two linked lanes plus the
+  widest lane: SUMO changes lanes, and corners, in one timestep (see ``Roaming``);
 * no watcher moves by more than the way that was *measured* in that timestep, the longest of all.
 
-So as long as the sum over the timesteps of stride and measured way stays below g, the boxes are
-apart, whatever turns are taken. That sum is a lookout's odometer. Who walks must see others before
-it touches them, so whoever may be within AROUND_M of a watcher is read too: g is less by that.
-Bodies for which the bound does not hold are read in every timestep: those with stops or rides ahead
-(they park, board, jump), and persons where the network has no walking areas (they jump over
-junctions). Should a body ever be
-found farther from its last place than the bound allows, a SimulationError says so.
+As long as the sum over the timesteps of stride and measured way stays below g, the boxes are apart,
+for any turns. That sum is a lookout's odometer. Pedestrians must see others before they touch them,
+so bodies that may be within AROUND_M of a watcher are read too: g is less by that. Bodies for which
+the bound does not hold are read in every timestep: those with stops or rides ahead (they park,
+board, jump), and persons if the network has no walking areas (they jump over junctions). A body
+found farther from its last place than the bound allows raises a SimulationError.
 """
 
 from __future__ import annotations
@@ -43,7 +42,7 @@ WALKING = 2  # SUMO's number of the stage in which a person walks
 
 
 class Roaming(NamedTuple):
-    """How much farther a body may get on a network than its speed says.
+    """Bounds on the distance that a body moves beyond its speed on a network.
 
     Attributes:
         stretch: drawn metres for a metre driven, at least 1.
@@ -77,7 +76,7 @@ class Background:
 
     Args:
         vehicles, persons: SUMO's two domains.
-        roaming: of the network; None reads everybody in every timestep.
+        roaming: of the network; None reads all bodies in every timestep.
         dt: length of a timestep [s].
         watchers: the ego and the testers as they are now.
     """
@@ -100,11 +99,11 @@ class Background:
     def read(
         self, vehicles: tuple[str, ...], persons: tuple[str, ...], watchers: Sequence[BodyState]
     ) -> tuple[RawState, ...]:
-        """Everybody, or at least all who may touch a watcher now; called in every timestep.
+        """All bodies, or at least those that may touch a watcher now; called in every timestep.
 
         Args:
             vehicles, persons: the ids of all in SUMO.
-            watchers: the ego and the testers, in the order of always.
+            watchers: the ego and the testers, always in the same order.
         """
         way = 0.0  # the longest that any watcher made
         for before, now in zip(self._watchers, watchers, strict=True):
@@ -117,11 +116,11 @@ class Background:
 
 
 class Sighting:
-    """One background body: what it is and when to look at it again.
+    """One background body, and when to read it again.
 
     Attributes:
-        body: who it is.
-        forward: no point of its box is farther from the middle of its front edge [m].
+        body: the body.
+        forward: largest distance of a point of its box from the middle of its front edge [m].
         tame: whether the bound of the module holds for it.
         due: the reading of the lookout's odometer from which on it may touch a watcher [m].
         x, y, step: where and when its front was last read.
@@ -164,7 +163,7 @@ class Lookout:
     def read(
         self, ids: tuple[str, ...], way: float, watchers: Sequence[BodyState]
     ) -> list[RawState]:
-        """Those who may touch a watcher now, or everybody, in the order of their ids."""
+        """The bodies that may touch a watcher now, or all, in the order of their ids."""
         self._step += 1
         self._odometer += self._stride + way
         if ids != self._ids:
@@ -184,7 +183,7 @@ class Lookout:
         return [self._look(other) for other in near]
 
     def _muster(self, ids: tuple[str, ...]) -> None:
-        """Note who came and who left; who came is read at once."""
+        """Register new bodies, which are read at once, and remove those that left."""
         self._ids = ids
         known = self._known
         self._known = {i: known.get(i) or self._meet(i) for i in ids if i not in self._mine}
@@ -204,7 +203,7 @@ class Lookout:
         return Sighting(Body(body_id, kind), self._everything or not self._restless(body_id))
 
     def _near(self, other: Sighting, watchers: Sequence[BodyState]) -> bool:
-        """Look where a body is: whether it may touch a watcher now, and if not, when next."""
+        """Read a body: whether it may touch a watcher now, and if not, when to read it next."""
         x, y = self._domain.getPosition(other.body.id)
         gap = math.inf
         for body, there_x, there_y, _, _ in watchers:
@@ -240,7 +239,7 @@ class Lookout:
 
 
 def _rides(persons: Any, body_id: str, roaming: Roaming | None) -> bool:
-    """Whether a person does anything but walk, or walks where walking is jumping."""
+    """Whether a person does more than walk, or walks on a network where persons jump."""
     if roaming is None or not roaming.walkable:
         return True
     left = range(persons.getRemainingStages(body_id))

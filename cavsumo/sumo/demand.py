@@ -1,56 +1,26 @@
-"""The background traffic of a scenario, noted once and sent again into a simulation that goes on.
+"""The background traffic of a scenario, recorded once and sent again into a running simulation.
 
-SUMO reads a route file along its own clock, so a simulation that serves many episodes cannot use
-it. Instead the demand is played once without ego and testers: who departs when, where, how fast,
-on which route. Each episode then gets these departures again, counted from its own beginning. What
-SUMO draws by itself (speed factors, dawdling) is drawn anew.
+SUMO reads a route file along its own clock, so a simulation for many episodes cannot use it.
+Instead the demand is played once without ego and testers, and all departures are recorded with
+time, place, speed and route. Each episode then gets these departures again, counted from its own
+beginning. SUMO's own random numbers (speed factors, dawdling) are drawn anew.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 from xml.etree import ElementTree
 
 from cavsumo.errors import InputError
+from cavsumo.model.departures import Attributes, Demand, Stage, Trip, Walk
 
 BEYOND_S = 60.0  # how far beyond the horizon there must be demand, for waits and overtime
 WALKING = 2  # SUMO's number of the stage in which a person walks
 WAITING = 1  # and in which one waits
-# What a route file may hold besides departures.
+# Elements of a route file besides departures.
 LASTING = ("vType", "vTypeDistribution", "route", "routeDistribution")
-
-
-class Trip(NamedTuple):
-    """The departure of a vehicle."""
-
-    time: float  # s since the beginning
-    id: str
-    type: str
-    edges: tuple[str, ...]
-    lane: int
-    along: float  # m
-    speed: float  # m/s
-
-
-class Walk(NamedTuple):
-    """The departure of a person; each stage is edges and where it ends, or no edges and a wait."""
-
-    time: float  # s since the beginning
-    id: str
-    type: str
-    edge: str
-    along: float  # m
-    stages: tuple[tuple[tuple[str, ...], float], ...]
-
-
-@dataclass(frozen=True)
-class Demand:
-    """All departures of a scenario in the order of their times."""
-
-    trips: tuple[Trip, ...] = ()
-    walks: tuple[Walk, ...] = ()
 
 
 def types_only(route_file: Path) -> str:
@@ -64,49 +34,78 @@ def types_only(route_file: Path) -> str:
 
 def noted(sumo: Any, duration: float) -> Demand:
     """Play the simulation that has been started for a duration [s], and note who departs."""
-    trips: list[Trip] = []
-    walks: list[Walk] = []
+    notes = DepartureNotes({}, frozenset())
     while (now := sumo.simulation.getTime()) < duration:
         sumo.simulationStep()
-        trips += [_trip(sumo.vehicle, now, v) for v in sumo.simulation.getDepartedIDList()]
-        walks += [_walk(sumo.person, now, p) for p in sumo.simulation.getDepartedPersonIDList()]
-    return Demand(tuple(trips), tuple(walks))
+        notes.add(sumo, now)
+    return notes.demand()
+
+
+class DepartureNotes:
+    """Departures so far in a simulation.
+
+    Args:
+        types: of the demand.
+        apart: ids of those who are no background.
+    """
+
+    def __init__(self, types: Mapping[str, Attributes], apart: frozenset[str]) -> None:
+        self._types, self._apart = types, apart
+        self._trips: list[Trip] = []
+        self._walks: list[Walk] = []
+
+    def add(self, sumo: Any, now: float) -> None:
+        """Note who departed in the timestep that began at a time [s]."""
+        for name in sumo.simulation.getDepartedIDList():
+            if name not in self._apart:
+                self._trips.append(_trip(sumo.vehicle, now, name))
+        for name in sumo.simulation.getDepartedPersonIDList():
+            if name not in self._apart:
+                self._walks.append(_walk(sumo.person, now, name))
+
+    def demand(self) -> Demand:
+        """All of them, with the types that they are of."""
+        used = {trip.type for trip in self._trips} | {walk.type for walk in self._walks}
+        types = {name: type_ for name, type_ in self._types.items() if name in used}
+        return Demand(tuple(self._trips), tuple(self._walks), types)
 
 
 def _trip(vehicle: Any, now: float, name: str) -> Trip:
     """A vehicle that has just departed."""
     return Trip(
-        now,
+        round(now, 3),
         name,
         vehicle.getTypeID(name),
         tuple(vehicle.getRoute(name)),
         vehicle.getLaneIndex(name),
         vehicle.getLanePosition(name),
         vehicle.getSpeed(name),
+        vehicle.getSpeedFactor(name),
     )
 
 
 def _walk(person: Any, now: float, name: str) -> Walk:
-    """A person who has just departed; raises InputError for one who does not just walk or wait."""
+    """A person that has just departed; raises InputError unless it only walks and waits."""
     stages = [person.getStage(name, i) for i in range(person.getRemainingStages(name))]
     for stage in stages:
         if stage.type not in (WALKING, WAITING):
             raise InputError(f"reset shared: person {name!r} rides; only walks can be sent again")
     return Walk(
-        now,
+        round(now, 3),
         name,
         person.getTypeID(name),
         person.getRoadID(name),
         person.getLanePosition(name),
+        person.getSpeedFactor(name),
         tuple(
-            (tuple(s.edges), s.arrivalPos) if s.type == WALKING else ((), s.travelTime)
+            Stage(tuple(s.edges), s.arrivalPos) if s.type == WALKING else Stage((), s.travelTime)
             for s in stages
         ),
     )
 
 
 class Departures:
-    """A demand being sent again, each body when its time has come.
+    """A demand that is sent again, each body at its time.
 
     Args:
         sumo: SUMO's functions, of a simulation that was started without the demand.
@@ -127,7 +126,7 @@ class Departures:
         self._next_walk = next(self._walks, None)
 
     def send(self) -> None:
-        """Let go who departs in the timestep that comes next; call before each."""
+        """Send the departures of the next timestep; call before each."""
         now = self._steps * self._dt + 1e-6
         self._steps += 1
         while self._next_trip is not None and self._next_trip.time <= now:
@@ -177,7 +176,7 @@ class Lights:
         ]
 
     def restore(self) -> None:
-        """Put them back; static programs then run as they did."""
+        """Restore them; static programs then run as they did."""
         for name, phase, left in self._first:
             self._lights.setPhase(name, phase)
             self._lights.setPhaseDuration(name, left)

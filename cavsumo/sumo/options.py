@@ -1,4 +1,4 @@
-"""The options that SUMO always runs with: its defaults are made for traffic studies, not tests."""
+"""The options with which SUMO always runs; its defaults are made for traffic studies, not tests."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Poses as SUMO has them, and as cavsumo does; converted here and nowhere else.
+"""Conversion between SUMO's poses and cavsumo's; the only place of it.
 
 * cavsumo: the centre of the box [m], radians anticlockwise from east;
 * SUMO: the middle of the front edge [m], degrees clockwise from north.
@@ -29,7 +29,7 @@ def from_sumo(x: float, y: float, angle: float, length: float) -> tuple[float, f
 
 
 def front(state: BodyState) -> tuple[float, float, float]:
-    """A state as SUMO is told it; raises SimulationError when it is not finite."""
+    """A state in SUMO's form; raises SimulationError when it is not finite."""
     body, x, y, v, o = state
     if not math.isfinite(x + y + v + o):  # SUMO hangs on an infinite angle
         raise SimulationError(f"{body.id}: state is not finite: {x}, {y}, {v}, {o}")

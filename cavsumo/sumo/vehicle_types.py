@@ -1,4 +1,4 @@
-"""The vehicle types that SUMO is given for the ego and the testers, as an additional file."""
+"""The vehicle types of the ego and the testers for SUMO, as an additional file."""
 
 from __future__ import annotations
 

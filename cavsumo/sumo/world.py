@@ -1,10 +1,10 @@
 """The one boundary to SUMO; nothing else imports libsumo.
 
-SUMO learns where the bodies are and moves the background traffic (and the ego, unless a
-controller drives it). What it says about moved bodies is never read back: their truth is in
+SUMO receives the positions of the bodies and moves the background traffic (and the ego, unless a
+controller drives it). Its states of moved bodies are never read back: their true states are in
 Python.
 
-Each process has one simulation: libsumo knows no second one.
+Each process has one simulation, as libsumo requires.
 """
 
 from __future__ import annotations
@@ -23,6 +23,7 @@ from cavsumo.egos.base import Acceleration, Command, Drive, Ego
 from cavsumo.errors import NoSuchAction, SimulationError, SimulationTaken
 from cavsumo.model.bodies import PEDESTRIAN, Body
 from cavsumo.model.carriageway import Start
+from cavsumo.model.departures import Demand
 from cavsumo.model.geometry import Box, gap
 from cavsumo.model.kinematics import steering_for_turn, step_floats, wrap
 from cavsumo.model.scenario import Scenario, Simulation
@@ -30,26 +31,27 @@ from cavsumo.model.snapshot import BodyState, RawState, Snapshot
 from cavsumo.network.site import Site
 from cavsumo.sumo.background import Background, Roaming, roaming
 from cavsumo.sumo.connection import Simulations
+from cavsumo.sumo.demand import DepartureNotes
 from cavsumo.sumo.poses import from_sumo, front
 
 EGO = "ego"
-ENTRY_S = 30.0  # how long the ego may wait for room to enter the network
-PROMPT_S = 1.0  # an ego that waited longer has the traffic light set once more
+ENTRY_S = 30.0  # longest wait of the ego for room to enter the network
+PROMPT_S = 1.0  # after a longer wait of the ego the traffic light is set once more
 KEEP_EXACT = 2  # moveToXY: exactly there, on the network or off it
 KEEP_EXACT_ANY_LANE = 6  # the same for persons, on lanes for cars too
 # moveToXY looks for lanes within this distance only; SUMO's default of 100 m costs ten times as
 # much per call for a body off the road, and no lane is wider than twice this.
 MATCH_M = 5.0
-ROOM_M = 2.0  # traffic nearer to a tester vehicle than this at the start is taken away
-UNSAFE = 0  # setSpeedMode: no check of SUMO's own interferes with what was commanded
-# Which world of this process has its one simulation: the one that began an episode last.
+ROOM_M = 2.0  # traffic nearer to a tester vehicle than this at the start is removed
+UNSAFE = 0  # setSpeedMode: none of SUMO's checks changes the commanded speed
+# The world that has the one simulation of this process: the one that last began an episode.
 _PLAYING: list[object] = [None]
 
 
 class World:
     """One SUMO simulation at a time; a context manager.
 
-    A world that begins an episode takes the simulation from whichever had it in this process.
+    A world that begins an episode takes the simulation from any other world in this process.
 
     Attributes:
         simulations: starts and advances SUMO.
@@ -80,7 +82,7 @@ class World:
         self.close()
 
     def close(self) -> None:
-        """End the simulation; harmless when there is none, or when another world has it."""
+        """End the simulation; harmless if there is none, or if another world has it."""
         if _PLAYING[0] in (None, self._mark):
             libsumo.close()
             _PLAYING[0] = None
@@ -95,17 +97,23 @@ class World:
         *,
         everything: bool = True,
         simulation: Simulation = "own",
+        demand: Demand | None = None,
+        note: bool = False,
     ) -> Snapshot:
-        """Begin an episode and wait until the ego is on the road; the testers stand where given.
+        """Begin an episode and wait until the ego is on the road; the testers stand at their
+        starts.
 
         Args:
-            simulation: "own" starts SUMO afresh, for the same bits whatever was before; "new"
+            simulation: "own" starts SUMO afresh, for the same bits after any history; "new"
                 starts one that serves several episodes, of which the later ones say "same".
             everything: show the whole background in every snapshot; else only those who may touch
                 the ego or a tester, which is all that contacts need.
+            demand: departures that were noted in another episode, in place of the scenario's own
+                demand; only in an own simulation.
+            note: note who departs (``departures``).
 
-        Raises SimulationError with SUMO's own words when it refuses, or when the ego finds no
-        room to enter.
+        Raises SimulationError with SUMO's message if SUMO refuses, or if the ego finds no room to
+        enter.
         """
         self.collisions: set[tuple[str, str]] = set()
         self.teleports = self.emergency_stops = 0
@@ -114,11 +122,14 @@ class World:
         self._step, self._steering = 0, 0.0
         self._commanded = False
         self._vehicles: tuple[str, ...] = ()
+        self._departures: DepartureNotes | None = None
         if simulation == "same":
             self._check_own()
         _PLAYING[0] = self._mark
         with self._listening():
-            self.simulations.begin(seed, simulation)
+            self.simulations.begin(seed, simulation, demand)
+            if note:
+                self._departures = self._notes(demand, states)
             self._insert(states, starts)
             ego = self._enter(states)
             self._make_room(states, starts)
@@ -127,7 +138,7 @@ class World:
         return self._snapshot(ego, tuple(states))
 
     def everybody(self) -> tuple[RawState, ...]:
-        """All bodies but the ego and the testers, wherever they are."""
+        """All bodies but the ego and the testers, at any distance."""
         watchers = (self._ego, *self._states)
         background = Background(libsumo.vehicle, libsumo.person, None, self.dt, watchers)
         return background.read(self._vehicles, libsumo.person.getIDList(), watchers)
@@ -140,8 +151,8 @@ class World:
         """Advance one timestep; None when the ego has left the network.
 
         Args:
-            states: where the testers are at its end.
-            command: what the ego does during it.
+            states: the testers' states at its end.
+            command: the ego's command during it.
 
         Raises SimulationTaken when another world has begun an episode meanwhile.
         """
@@ -150,7 +161,7 @@ class World:
         try:
             self._place(states)
             self._command_ego(command)
-            self.simulations.advance()
+            self._advance()
             self._collect_events()
             ego = self._read_ego() if self._driven is None else self._driven
         except (libsumo.TraCIException, libsumo.FatalTraCIError) as error:
@@ -164,7 +175,7 @@ class World:
         return self._snapshot(ego, states)
 
     def _check_own(self) -> None:
-        """Refuse to go on in a simulation that is another world's by now, or nobody's."""
+        """Refuse to continue in a simulation that another world has taken or closed."""
         if _PLAYING[0] is not self._mark:
             raise SimulationTaken(
                 "this process has one simulation, and another world took or closed it; begin a new "
@@ -173,7 +184,7 @@ class World:
 
     @contextmanager
     def _listening(self) -> Iterator[None]:
-        """Turn what SUMO refuses into SimulationError with the words that it prints on stderr."""
+        """Turn SUMO's refusals into SimulationError with the message that it prints on stderr."""
         self._heard.truncate(0)
         stderr = os.dup(2)
         os.dup2(self._heard.fileno(), 2)
@@ -216,7 +227,7 @@ class World:
     def _enter(self, states: Sequence[BodyState]) -> BodyState:
         """Step until the ego has entered; the testers wait meanwhile."""
         for waited in range(max(2, round(ENTRY_S / self.dt))):
-            self.simulations.advance()
+            self._advance()
             ego = self._read_ego()
             if ego is not None:
                 if waited * self.dt > PROMPT_S:
@@ -231,9 +242,9 @@ class World:
         )
 
     def _make_room(self, states: Sequence[BodyState], starts: Sequence[Start]) -> None:
-        """Take traffic away that SUMO let in where a tester vehicle stands.
+        """Remove traffic that SUMO inserted at the place of a tester vehicle.
 
-        Who departs in the first timestep comes before SUMO knows of the testers.
+        Departures of the first timestep are inserted before the testers.
         """
         boxes = [s.box for s, start in zip(states, starts, strict=True) if start.approach]
         mine = {EGO, *(s.id for s in states)}
@@ -248,11 +259,11 @@ class World:
         self._vehicles = libsumo.vehicle.getIDList()
 
     def _is_person(self, state: BodyState) -> bool:
-        """Whether SUMO is shown a person; only pedestrians can be persons."""
+        """Whether a body is a person in SUMO; only pedestrians can be."""
         return self._persons and state.body.kind.name == PEDESTRIAN.name
 
     def _place(self, states: Sequence[BodyState]) -> None:
-        """Tell SUMO where the testers are; every timestep, or it moves them itself."""
+        """Send SUMO the testers' positions; in every timestep, or it moves them itself."""
         move, told = libsumo.vehicle.moveToXY, self._told
         for state in states:
             name = state.body.id
@@ -272,7 +283,7 @@ class World:
                 libsumo.vehicle.setSpeed(name, state.v)
 
     def _command_ego(self, command: Command) -> None:
-        """Pass on what the ego does; None leaves it to SUMO."""
+        """Pass on the ego's command; None leaves the ego to SUMO."""
         if command is None:
             return
         if not self._commanded:  # its first command may come late, when another driver takes over
@@ -288,7 +299,26 @@ class World:
             self._steering = command.steering
             self._place([self._driven])
 
-    # What SUMO says
+    # Reading from SUMO
+
+    def _notes(self, demand: Demand | None, states: Sequence[BodyState]) -> DepartureNotes | None:
+        """Where to note who departs; None when departures do not tell all of the demand."""
+        types = self.simulations.types_told if demand is None else demand.types
+        mine = frozenset((EGO, *(state.id for state in states)))
+        return None if types is None else DepartureNotes(types, mine)
+
+    @property
+    def departures(self) -> Demand | None:
+        """Departures so far in this episode; None if not noted, or if they would not tell all."""
+        return None if self._departures is None else self._departures.demand()
+
+    def _advance(self) -> None:
+        """One timestep of SUMO; those who depart in it are noted."""
+        notes = self._departures
+        now = libsumo.simulation.getTime() if notes is not None else 0.0
+        self.simulations.advance()
+        if notes is not None:
+            notes.add(libsumo, now)
 
     def _read_ego(self) -> BodyState | None:
         """The ego as SUMO moves it; None before it entered and after it left."""
@@ -316,7 +346,7 @@ class World:
         return min(kind.steering_max, max(-kind.steering_max, steering))
 
     def _snapshot(self, ego: BodyState, states: tuple[BodyState, ...]) -> Snapshot:
-        """Everything at this moment, the background as SUMO has it."""
+        """The state at this moment, with SUMO's background."""
         if self._driven is not None:
             self._vehicles = libsumo.vehicle.getIDList()
         persons = libsumo.person.getIDList()
@@ -330,7 +360,7 @@ class World:
         )
 
     def _lookout(self, everything: bool, watchers: Sequence[BodyState]) -> Background:
-        """The background of this episode; the network is measured when that first matters."""
+        """The background of this episode; the network is measured at the first use."""
         if not everything and self._roaming is None:
             self._roaming = roaming(libsumo.lane)
         free = None if everything else self._roaming
@@ -347,7 +377,7 @@ class World:
 
 
 def _route_of(start: Start) -> str:
-    """The id of SUMO's route for a tester: its way, by which others see where it will go."""
+    """The id of SUMO's route for a tester: its way, by which SUMO's drivers anticipate it."""
     if start.approach is None:
         return "cavsumo_tester"
     name = " ".join(("cavsumo", *start.approach.edges))

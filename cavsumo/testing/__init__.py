@@ -1,4 +1,4 @@
-"""What every ego, agent and assertion must do, as checks and as pytest classes (``contracts``).
+"""Requirements on every ego, agent and assertion, as checks and as pytest classes (``contracts``).
 
 pytest is loaded with the classes only: ``cavsumo check-ego`` plays the checks without it. No SUMO
 is needed. To add a check: a function in one of the ``*_checks``, called by ``contracts``.

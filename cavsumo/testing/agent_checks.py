@@ -1,4 +1,4 @@
-"""What every tester agent must do: checks that play scripted drives to it."""
+"""Requirements on every tester agent: checks that play scripted drives to it."""
 
 from __future__ import annotations
 
@@ -26,10 +26,10 @@ Joint = tuple[Action, ...]
 def choices(
     agent: Agent, ground: ScriptNetwork, script: Script, seed: int = 1, *, apart: bool = False
 ) -> list[Joint]:
-    """What an agent with two of four bodies does in a script, each action checked.
+    """The actions of an agent with two of four bodies in a script, each checked.
 
-    The ego drives past at constant speed; bodies of others stand. ``apart``: nobody of the
-    background is shown that is near a tester.
+    The ego drives past at constant speed; bodies of others stand. ``apart``: without background
+    bodies near a tester.
     """
     scene = ground.scene(EGO_KIND, seed, TESTERS)
     agent.reset(scene, OWNED, np.random.default_rng(seed))
@@ -78,20 +78,20 @@ def check_acts_for_its_bodies(make: MakeAgent, ground: ScriptNetwork) -> str:
 
 
 def check_repeatable(make: MakeAgent, ground: ScriptNetwork) -> str:
-    """The same scene, generator and memory: the same actions, whatever was in between."""
+    """The same scene, generator and memory give the same actions, also after other episodes."""
     agent = make()
     known = agent.recall()
     first = choices(agent, ground, CROWDED)
     choices(agent, ground, EMPTY, seed=2)
     if known is not None:
         agent.remember(known)
-    assert choices(agent, ground, CROWDED) == first, "another life of it chose other actions"
+    assert choices(agent, ground, CROWDED) == first, "a second instance chose other actions"
     assert choices(make(), ground, CROWDED) == first, "another one of it chose other actions"
     return f"{len(first)} joint actions, three times the same"
 
 
 def check_draws_from_its_generator_only(make: MakeAgent, ground: ScriptNetwork) -> str:
-    """The generators that all share are left alone."""
+    """The global generators stay unused."""
     before = random.getstate(), repr(np.random.get_state())
     choices(make(), ground, CROWDED)
     assert before[0] == random.getstate(), "it drew from the module random"
@@ -100,7 +100,7 @@ def check_draws_from_its_generator_only(make: MakeAgent, ground: ScriptNetwork) 
 
 
 def check_memory(make: MakeAgent, ground: ScriptNetwork) -> str:
-    """What it learned is plain data, and another one that takes it up acts alike."""
+    """Its knowledge is plain data, and another instance that takes it up acts alike."""
     agent = make()
     choices(agent, ground, CROWDED)
     memory = agent.recall()
@@ -117,7 +117,7 @@ def check_memory(make: MakeAgent, ground: ScriptNetwork) -> str:
 
 
 def check_sees_what_it_says(make: MakeAgent, ground: ScriptNetwork) -> str:
-    """An agent that says it does not look at the background sees at most who is beside it."""
+    """An agent with ``sees_background = False`` uses at most the bodies beside it."""
     if make().sees_background:
         return "looks at the background"
     seen = choices(make(), ground, CROWDED, apart=True)
@@ -143,7 +143,7 @@ CHECKS: Mapping[str, Check] = {
 def _snapshot(
     scene: Scene, script: Script, states: tuple[BodyState, ...], step: int, apart: bool
 ) -> Snapshot:
-    """What is seen at a timestep."""
+    """The snapshot of a timestep."""
     along = min(EGO_SPEED * step * scene.dt, scene.ego_path.length)
     x, y, o = scene.ego_path.at(along)
     ego = BodyState(scene.ego, x, y, EGO_SPEED, o)

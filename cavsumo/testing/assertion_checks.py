@@ -1,4 +1,4 @@
-"""What every assertion must do: checks that show it encounters of an ego and a tester."""
+"""Requirements on every assertion: checks that show it encounters of an ego and a tester."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ def encounter(
 
 
 def judged(assertion: Assertion, scene: Scene, frames: list[Frame]) -> Iterator[Judgement]:
-    """What an assertion says after each snapshot and at the end, each of it checked."""
+    """The judgements of an assertion after each snapshot and at the end, each checked."""
     assertion.reset(scene)
     final: Judgement | None = None
     for snapshot, contacts in frames:
@@ -64,7 +64,7 @@ def judged(assertion: Assertion, scene: Scene, frames: list[Frame]) -> Iterator[
 
 
 def check_judgement(assertion: Assertion, said: Judgement, now: float, at: str) -> None:
-    """Whether a judgement agrees with itself."""
+    """Check that a judgement is consistent."""
     assert said.assertion == assertion.name, f"{at}: judges in the name of {said.assertion!r}"
     assert said.verdict in SEVERITY, f"{at}: no such verdict: {said.verdict!r}"
     assert not (assertion.decided and assertion.pending), f"{at}: decided and pending"
@@ -85,7 +85,7 @@ def check_judgement(assertion: Assertion, said: Judgement, now: float, at: str) 
 
 
 def check_encounters(make: MakeAssertion, ground: ScriptNetwork) -> str:
-    """Thirty encounters: every judgement agrees with itself, what is decided stays."""
+    """Thirty encounters: every judgement is consistent, and decided judgements stay."""
     assertion, found = make(), []
     for seed in range(ENCOUNTERS):
         found.append([*judged(assertion, *encounter(ground, seed))][-1].verdict)
@@ -93,7 +93,7 @@ def check_encounters(make: MakeAssertion, ground: ScriptNetwork) -> str:
 
 
 def check_reset_forgets(make: MakeAssertion, ground: ScriptNetwork) -> str:
-    """The same encounter is judged the same, whatever was judged before."""
+    """The same encounter gets the same judgement, also after other encounters."""
     used = make()
     for seed in range(10):
         scene, frames = encounter(ground, seed)
@@ -103,7 +103,7 @@ def check_reset_forgets(make: MakeAssertion, ground: ScriptNetwork) -> str:
 
 
 def check_sees_what_it_says(make: MakeAssertion, ground: ScriptNetwork) -> str:
-    """An assertion that says it does not look at the background does not."""
+    """An assertion with ``sees_background = False`` does not use the background."""
     if make().sees_background:
         return "looks at the background"
     for seed in range(10):

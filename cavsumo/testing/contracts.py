@@ -1,6 +1,6 @@
-"""Contracts as pytest classes: what every ego, agent and assertion must do.
+"""Contracts as pytest classes: the requirements on every ego, agent and assertion.
 
-Derive a class in a test file, name a network and say how to make the thing::
+Derive a class in a test file, name a network and make the object under test::
 
     from cavsumo.testing import EgoContract
 
@@ -29,7 +29,7 @@ __all__ = ["AgentContract", "AssertionContract", "EgoContract"]
 
 
 class _Contract:
-    """What the three contracts share.
+    """The common part of the three contracts.
 
     Attributes:
         net: a network file on which the drives take place.
@@ -38,12 +38,12 @@ class _Contract:
     net: Path
 
     def ground(self) -> ScriptNetwork:
-        """Where the drives take place."""
+        """The ground of the drives."""
         return ground(self.net, EGO_KIND)
 
 
 class EgoContract(_Contract):
-    """What every ego must do (``ego_checks``)."""
+    """The requirements on every ego (``ego_checks``)."""
 
     def make(self) -> Ego:
         """A new ego."""
@@ -56,7 +56,7 @@ class EgoContract(_Contract):
 
 
 class AgentContract(_Contract):
-    """What every tester agent must do (``agent_checks``)."""
+    """The requirements on every tester agent (``agent_checks``)."""
 
     def make(self) -> Agent:
         """A new agent."""
@@ -69,7 +69,7 @@ class AgentContract(_Contract):
 
 
 class AssertionContract(_Contract):
-    """What every assertion must do (``assertion_checks``)."""
+    """The requirements on every assertion (``assertion_checks``)."""
 
     def make(self) -> Assertion:
         """A new assertion."""

@@ -1,7 +1,7 @@
-"""What every ego must do, whatever it is driven by: checks that play scripted drives to it.
+"""Requirements on every ego, of any kind: checks that play scripted drives to it.
 
-Each check is given a function that makes the ego and the ground, and returns a remark; it raises
-AssertionError, or whatever the ego raises, when the ego fails it.
+Each check receives a function that makes the ego, and the ground, and returns a remark; it raises
+AssertionError, or the ego's error, if the ego fails it.
 """
 
 from __future__ import annotations
@@ -85,7 +85,7 @@ def check_empty_road(make: MakeEgo, ground: ScriptNetwork) -> str:
 
 
 def check_crowded_road(make: MakeEgo, ground: ScriptNetwork) -> str:
-    """Sixty bodies around it; how long its answers take is said."""
+    """Sixty bodies around it; the remark has the time of its answers."""
     with prepared(make, ground) as ego:
         waits: list[float] = []
         act = ego.act
@@ -103,7 +103,7 @@ def check_crowded_road(make: MakeEgo, ground: ScriptNetwork) -> str:
 
 
 def check_reset_twice(make: MakeEgo, ground: ScriptNetwork) -> str:
-    """The same episode again gets the same answers, after a whole one, a broken one, none."""
+    """The same episode gets the same answers after a whole, an interrupted and no episode."""
     with prepared(make, ground) as ego:
         first = commands(ego, ground, CROWDED)
         _same(first, commands(ego, ground, CROWDED), "after an episode")
@@ -166,7 +166,7 @@ def _plain(command: Command) -> str:
 
 
 def _sort(command: Command) -> str:
-    """What sort of command it is, in words."""
+    """The type of a command, in words."""
     if command is None:
         return "nothing: SUMO drives"
     return "accelerations" if isinstance(command, Acceleration) else "throttle and steering"

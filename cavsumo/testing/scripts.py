@@ -1,7 +1,7 @@
-"""Scripted drives on a real network, without SUMO: what egos, agents and assertions are shown.
+"""Scripted drives on a real network, without SUMO, for egos, agents and assertions.
 
-The ego's way, the carriageways and the lights are those of a network file. Everybody else moves as
-a script says, so that the same drive can be shown again, number for number.
+The ego's way, the carriageways and the lights are those of a network file. All other bodies follow
+a script, so that the same drive can be repeated number for number.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from cavsumo.model.snapshot import BodyState, RawState, Snapshot
 from cavsumo.network.site import Site, derive_site
 
 DT = 0.1  # s
-SPEED = 8.0  # of an ego that does not say how fast it begins [m/s]
+SPEED = 8.0  # of an ego without a start speed [m/s]
 CROWD = (PEDESTRIAN, CAR, BICYCLE, PEDESTRIAN, BUS, PEDESTRIAN)
 LETTERS = "rrruGGGGgy"  # shown for 3 s each
 TESTERS = 3
@@ -35,7 +35,7 @@ class ScriptNetwork:
     dt: float = DT
 
     def mission(self, steps: int) -> Mission:
-        """What an ego is told beforehand."""
+        """The data that an ego has before its first episode."""
         site, route = self.site, self.site.route
         return Mission(site.net, route.edges, route.path, site.lights, self.dt, steps * self.dt)
 
@@ -54,14 +54,14 @@ Others = Callable[[Scene, int], tuple[RawState, ...]]
 
 @dataclass(frozen=True)
 class Script:
-    """A drive as it is shown.
+    """A scripted drive.
 
     Attributes:
         steps: how many timesteps.
         others: the background bodies at each of them.
-        held: the ego is kept standing, whatever it commands, as in a jam.
+        held: the ego is kept standing against its commands, as in a jam.
         testers: how many tester pedestrians stand on the pavements.
-        letters: what the traffic lights show in turn.
+        letters: the states of the traffic lights in turn.
     """
 
     steps: int
@@ -98,7 +98,7 @@ def crowd(scene: Scene, step: int) -> tuple[RawState, ...]:
 
 
 def oddities(scene: Scene, step: int) -> tuple[RawState, ...]:
-    """Numbers and names that are valid and seldom met."""
+    """Numbers and names that are valid but rare."""
     x, y, o = scene.ego_path.at(scene.ego_path.length / 2)
     return (
         _raw("far", CAR, 1e9, -1e9, 0.0, math.pi),
@@ -110,7 +110,7 @@ def oddities(scene: Scene, step: int) -> tuple[RawState, ...]:
     )
 
 
-# Nobody to brake for and no red light to wait at: an ego that stands there will not drive.
+# No body to brake for and no red light: an ego that stands there does not drive at all.
 EMPTY, CROWDED = Script(200, nobody, testers=0, letters="G"), Script(200, crowd)
 ODD, LONG = Script(50, oddities), Script(6000, nobody, held=True)
 
@@ -164,7 +164,7 @@ def _speed(state: BodyState, command: Command, dt: float) -> float:
 
 
 def driven(state: BodyState, action: Action | Drive, dt: float) -> BodyState:
-    """A body after a timestep in which its effectors did something."""
+    """A body after a timestep with an action of its effectors."""
     (body, x, y, v, o), (throttle, steering) = state, action
     kind = body.kind
     limits = kind.wheelbase, kind.v_min, kind.v_max
@@ -172,7 +172,7 @@ def driven(state: BodyState, action: Action | Drive, dt: float) -> BodyState:
 
 
 def _lights(scene: Scene, step: int, letters: str) -> tuple[str, ...]:
-    """What the lights show: each its letters in turn."""
+    """The states of the lights: for each its letters in turn."""
     turn = int(step * scene.dt / 3.0)
     return tuple(letters[(turn + i) % len(letters)] for i in range(len(scene.lights)))
 

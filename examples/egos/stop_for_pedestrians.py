@@ -9,10 +9,10 @@ or, as a server that serves any number of connections,
 
 It needs Python's standard library only and keeps to its route: it answers with accelerations. The
 whole policy is `acceleration`, a function of plain numbers. Every hazard ahead is a place where the
-ego must be able to stop: whoever is in the strip that the ego will sweep, a pedestrian who walks
-towards it, a red light. The speed allowed is the highest from which it can stop there comfortably
-after a reaction time (the safe speed of Krauss, 1998); when that is suddenly much lower than the
-speed it has, because somebody stepped out, it brakes as hard as need be.
+ego must be able to stop: a body in the strip that the ego will sweep, a pedestrian that walks
+towards the strip, a red light. The allowed speed is the highest from which it can stop there
+comfortably after a reaction time (the safe speed of Krauss, 1998); when that is suddenly much lower
+than its speed, because a pedestrian stepped out, it brakes as hard as necessary.
 """
 
 import argparse
@@ -62,7 +62,7 @@ class Path:
 
 
 def acceleration(path, constants, speed, along, x, y, light, bodies):
-    """What to do now [m/s2].
+    """The acceleration for the next timestep [m/s2].
 
     path: the route. constants: timestep, length and width of the ego, its limits of acceleration.
     speed, along, x, y: of the ego's centre. light: None, or distance of its stop line from the

@@ -117,7 +117,7 @@ class Curve(BaseCallback):
         print(*(f"{k} {v}" for k, v in self.rows[-1].items()), sep=", ", flush=True)
 
     def _metadata(self) -> dict[str, Any]:
-        """What a policy file says of how it came to be."""
+        """The metadata of a policy file: how it was trained."""
         return {
             "trained on": self.options.net.name,
             "by": "DQN, stable-baselines3, examples/train_tester/train.py",

@@ -136,8 +136,8 @@ def test_nobody_comes_nearer_to_himself() -> None:
     ("outcome", "words"),
     [
         ("violated", "The ego hit tester1 at 10.5 s, closing at 4.3 m/s."),
-        ("held", "reaction-zone was triggered by tester1 at 9.8 s, and it coped"),
-        ("unfair", "tester1 left the ego no chance"),
+        ("held", "The ego passed the test: reaction-zone was triggered by tester1 at 9.8 s."),
+        ("unfair", "the ego could not have avoided tester1"),
         ("not_triggered", "No test"),
     ],
 )

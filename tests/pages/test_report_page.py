@@ -74,7 +74,7 @@ def test_the_answer_comes_first(tmp_path: Path) -> None:
         "50.0 % [15.0, 85.0]."
     )
     assert certainty(report) == "In brackets: 95 % intervals in per cent, by Wilson."
-    assert excluded(report).startswith("1 episode of 8 was unfair: a tester left the ego no chance")
+    assert excluded(report).startswith("1 episode of 8 was unfair: the ego could not have stopped")
     assert excluded(report).endswith("1 could not be played (errors) and are left out.")
     assert headline(report).endswith("Testers: 3 x pedestrian. 8 episodes, seed 1.")
 

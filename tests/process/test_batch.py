@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from inline import played_here
 
 from cavsumo.batch.dispatch import run_batch
 from cavsumo.batch.executors import local_executor
@@ -54,6 +55,12 @@ def answers(prepared: PreparedBatch, jobs: int = 1) -> list[Answer]:
     """The outcomes of a batch in processes of its own, with what the agents know after each."""
     with local_executor(jobs) as executor:
         return list(run_batch(prepared, executor, prepared.plan.todo()))
+
+
+def answers_here(prepared: PreparedBatch, jobs: int = 1) -> list[Answer]:
+    """The same in this process."""
+    with played_here():
+        return answers(prepared, jobs)
 
 
 def played(prepared: PreparedBatch) -> list[Outcome]:
@@ -103,7 +110,7 @@ def trial(set_up: SetUp, tmp_path_factory: pytest.TempPathFactory) -> Iterator[T
 
     with pytest.MonkeyPatch.context() as patch:
         patch.syspath_prepend(str(folder))
-        outcomes = played(doomed())
+        outcomes = [answer.outcome for answer in answers_here(doomed())]
         start = frames(outcomes[DOOMED])[0]["testers"]["tester0"][0]
         yield Trial(doomed, [lasting(o) for o in outcomes], start)
 
@@ -147,7 +154,7 @@ PAIR = {"routes": "auto", "agents": ["random", "timing"], "trace": "all"}
 @pytest.fixture(scope="module")
 def recorded(set_up: SetUp) -> list[Outcome]:
     """Two episodes each of two agents on a real junction, with traffic and the default ego."""
-    return played(set_up("crossing", runs=2, **PAIR))
+    return [a.outcome for a in answers_here(set_up("crossing", runs=2, **PAIR))]
 
 
 def test_the_same_plan_twice_gives_the_same_rows_and_frames(
@@ -165,7 +172,7 @@ def test_an_episode_is_the_same_in_any_batch_and_order(
 ) -> None:
     """Run i stays what it is when more runs are asked for, and whatever was played before it."""
     prepared = set_up("crossing", runs=5, **PAIR)
-    with Worker(prepared) as worker:
+    with played_here(), Worker(prepared) as worker:
         for run in (3, 0, 2, 1):
             outcome = worker.play(job(prepared.plan, run)).outcome
             assert lasting(outcome) == lasting(recorded[run])
@@ -191,7 +198,7 @@ SCHOOL = {"runs": 3, "testers": 2, "trace": "none", "end": 15.0}
 @pytest.fixture(scope="module")
 def learned(set_up: SetUp) -> list[Any]:
     """What two Q-learning testers know after each of three episodes in one process."""
-    return [answer.memory for answer in answers(set_up(agents=["q-learning"], **SCHOOL))]
+    return [answer.memory for answer in answers_here(set_up(agents=["q-learning"], **SCHOOL))]
 
 
 def test_learning_goes_on_in_the_next_process(set_up: SetUp, learned: list[Any]) -> None:
@@ -220,6 +227,6 @@ def test_a_death_loses_one_episode_and_not_the_training(trial: Trial) -> None:
 def test_a_learner_learns_from_its_own_episodes_only(set_up: SetUp, learned: list[Any]) -> None:
     """Beside another agent it knows as much after each of its episodes as it does alone."""
     prepared = set_up(agents=["random", "q-learning"], **SCHOOL)
-    memories = [answer.memory for answer in answers(prepared, jobs=2)]
+    memories = [answer.memory for answer in answers_here(prepared, jobs=2)]
     assert memories[1::2] == learned
     assert memories[0::2] == [None, None, None]

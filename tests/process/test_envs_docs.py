@@ -14,9 +14,9 @@ from support import ROOT
 
 from cavsumo.agents import observations
 from cavsumo.envs import ego_observations, ego_rewards, events, tester
+from cavsumo.envs.commanded import CommandedEgo
 from cavsumo.envs.ego import EgoEnv
 from cavsumo.envs.parallel import CavsumoParallelEnv
-from cavsumo.envs.puppets import PuppetEgo
 from cavsumo.model.bodies import CAR, PEDESTRIAN
 from cavsumo.simulation import rewards
 
@@ -39,7 +39,7 @@ def test_the_tables_of_observations_are_the_codes(which: str) -> None:
     if which == "tester":
         entries = observations.entries(1, PEDESTRIAN.v_max, CAR.steering_max)
     else:
-        entries = ego_observations.entries(PuppetEgo().kind)
+        entries = ego_observations.entries(CommandedEgo().kind)
     letters = [
         (re.sub(r"^body\d+", "bodyI" if which == "tester" else "bodyK", name), low, high)
         for name, low, high in entries

@@ -22,7 +22,6 @@ from support import PATIENCE_S, rows, until, untold
 from cavsumo.batch.dispatch import run_batch
 from cavsumo.batch.executors import Means, local_executor, opened
 from cavsumo.batch.prepared import PreparedBatch, prepare
-from cavsumo.batch.worker import close_all
 from cavsumo.cli import main
 from cavsumo.errors import BatchError
 from cavsumo.model.scenario import SHARED_BY, plan_from
@@ -48,8 +47,8 @@ def prepared(networks: dict[str, Path]) -> PreparedBatch:
 
 @pytest.fixture(scope="module")
 def quiet(prepared: PreparedBatch) -> list[Any]:
-    """What comes out of one process, episode by episode."""
-    with local_executor(1) as executor:
+    """What comes out of this process, episode by episode."""
+    with played_here(), local_executor(1) as executor:
         return played(prepared, executor)
 
 
@@ -87,7 +86,7 @@ def test_episodes_that_share_a_simulation_do_not_depend_on_who_plays_them(
     """In this process or two others, at once or resumed in the middle of a block: the same rows."""
     monkeypatch.chdir(tmp_path)
     words = ["run", "-n", str(networks["crossing"]), "--reset", "shared", "--testers", "1"]
-    words += ["--runs", str(SHARED_BY + 3), "--end", "6", "-q", "--exit-zero"]
+    words += ["--runs", str(SHARED_BY + 3), "--end", "3", "-q", "--exit-zero"]
     with played_here():
         assert main([*words, "-o", "alone.csv"]) == 0
     assert main([*words, "-o", "two.csv", "-j", "2"]) == 0
@@ -95,22 +94,20 @@ def test_episodes_that_share_a_simulation_do_not_depend_on_who_plays_them(
     assert untold(rows(file)) == alone
     lines = file.read_bytes().splitlines(keepends=True)
     file.write_bytes(b"".join(lines[:12]))
-    assert main(["run", "--resume", "-q", "--exit-zero", "-o", "two.csv"]) == 0
+    with played_here():
+        assert main(["run", "--resume", "-q", "--exit-zero", "-o", "two.csv"]) == 0
     assert untold(rows(file)) == alone
 
 
 def test_a_plain_thread_pool_will_do(prepared: PreparedBatch, quiet: list[Any]) -> None:
     """Any executor of the standard library can be given, as others keep to its interface."""
-    try:
-        with ThreadPoolExecutor(3) as executor:
-            assert played(prepared, executor) == quiet
-    finally:
-        close_all()
+    with played_here(), ThreadPoolExecutor(3) as executor:
+        assert played(prepared, executor) == quiet
 
 
 def test_a_plain_process_pool_will_do(prepared: PreparedBatch, quiet: list[Any]) -> None:
     """All that is sent there and back can be pickled."""
-    with ProcessPoolExecutor(2, multiprocessing.get_context("spawn")) as executor:
+    with ProcessPoolExecutor(1, multiprocessing.get_context("spawn")) as executor:
         assert played(prepared, executor) == quiet
 
 
@@ -211,6 +208,17 @@ def test_dask_plays_what_one_process_plays(
     with opened(Means(None, "dask", cluster.scheduler_address)) as (executor, jobs):
         assert jobs == 2
         assert played(prepared, executor) == quiet
+
+
+def test_a_dask_client_of_the_users_is_an_executor(prepared: PreparedBatch, cluster: Any) -> None:
+    """It plays, as many at a time as it has threads, and stays open."""
+    distributed = pytest.importorskip("distributed")
+    with distributed.Client(cluster) as client:
+        with opened(Means(executor=client)) as (executor, jobs):
+            assert jobs == 2
+            outcomes = run_batch(prepared, executor, range(2))
+            assert [answer.outcome.row["run"] for answer in outcomes] == [0, 1]
+        assert client.status == "running"
 
 
 def test_a_dask_worker_that_is_killed_loses_nothing(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import email
 import json
 import os
 import subprocess
@@ -34,6 +35,22 @@ def test_the_wheel_has_the_networks_and_no_other_copy(unpacked: Path) -> None:
     files += [*ROOT.glob("networks/*.net.xml"), *ROOT.glob("routes/*.rou.xml")]
     assert packed == {str(f.relative_to(ROOT)): f.read_bytes() for f in files}
     assert not (ROOT / "cavsumo" / "data").exists()
+
+
+def test_the_wheel_names_both_licences(unpacked: Path) -> None:
+    """The program's and the map data's, with their texts, and the notice beside the data."""
+    info = next(unpacked.glob("*.dist-info"))
+    metadata = email.message_from_string((info / "METADATA").read_text("utf-8"))
+    assert metadata["License-Expression"] == "Apache-2.0 AND ODbL-1.0"
+    files = metadata.get_all("License-File")
+    texts = [(info / "licenses" / name).read_text("utf-8") for name in files]
+    assert "Apache License" in texts[0]
+    notice = "Contains map data (c) OpenStreetMap contributors, available under the ODbL 1.0"
+    assert notice in texts[1]
+    assert texts[1] == (unpacked / "cavsumo/data/networks/README.md").read_text("utf-8")
+    for name in ("crossing", "junction"):
+        for file in (f"networks/{name}.net.xml", f"routes/{name}.rou.xml"):
+            assert notice in (unpacked / "cavsumo" / "data" / file).read_text("utf-8")
 
 
 def test_an_installed_cavsumo_plays_without_options(unpacked: Path, tmp_path: Path) -> None:

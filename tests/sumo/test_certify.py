@@ -30,6 +30,7 @@ from cavsumo.model.scenario import BatchPlan, Params, Scenario, plan_from
 from cavsumo.model.seeds import episode_seed
 from cavsumo.model.study import overruled
 from cavsumo.results.reading import HEADER
+from cavsumo.results.recorded_plan import recorded_plan
 from cavsumo.results.rows import row_line
 from cavsumo.results.statistics import lower_bound
 from cavsumo.results.traces import Trace, parsed
@@ -133,7 +134,7 @@ def test_without_a_trace_the_learner_lives_through_its_episodes(found: Path) -> 
 
 
 def test_recorded_actions_lead_to_the_same_trajectories(found: Path) -> None:
-    """Open loop: whatever the ego does now, the testers do what they did."""
+    """Open loop: whatever the ego does now, the testers do what they did, bit for bit."""
     record = recorded(found, LEARNT)
     assert record.trace is not None
     subject = run_of(found, LEARNT, open_loop=True)
@@ -143,11 +144,25 @@ def test_recorded_actions_lead_to_the_same_trajectories(found: Path) -> None:
         both = list(zip(record.trace.frames, trace.frames, strict=False))
         assert len(both) > 20
         for old, new in both:
-            for name, state in old["testers"].items():
-                *place, o = new["testers"][name]
-                assert place == pytest.approx(state[:3], abs=1e-9)
-                assert wrap(o - state[3]) == pytest.approx(0.0, abs=1e-9)
+            assert new["testers"] == old["testers"]
+        assert trace.head["starts"] == record.trace.head["starts"]
     assert both[-1][0]["ego"] != both[-1][1]["ego"]
+
+
+def test_the_actions_of_format_1_lead_to_nearly_the_same_trajectories(found: Path) -> None:
+    """They are computed from the frames, and the starts are drawn again."""
+    record = recorded(found, LEARNT)
+    assert record.trace is not None
+    old = Trace({**record.trace.head, "format": "cavsumo-trace-1"}, record.trace.frames)
+    record = dataclasses.replace(record, trace=old)
+    subject = of_run(record, {}, kept=True, open_loop=True)
+    assert subject.told == ()
+    trace = traced(plan_of(subject, found), 1)
+    for before, after in zip(old.frames, trace.frames, strict=False):
+        for name, state in before["testers"].items():
+            *place, o = after["testers"][name]
+            assert place == pytest.approx(state[:3], abs=1e-9)
+            assert wrap(o - state[3]) == pytest.approx(0.0, abs=1e-9)
 
 
 def test_an_agent_of_the_results_plays_what_it_learned(found: Path) -> None:
@@ -369,7 +384,7 @@ def test_a_certificate_is_the_least_of_its_egos(tmp_path: Path) -> None:
     assert found.violated == lower_bound(2, 100, 0.975)
     assert as_json(found)["egos"][1]["errors"] == 5
     assert not any(one.alike for one in found.guarantees)
-    assert "whichever of these 2 egos drives" in sentences(found)[0]
+    assert "against each of these 2 egos" in sentences(found)[0]
 
 
 @pytest.mark.parametrize(

@@ -9,6 +9,7 @@ from typing import Any
 import pytest
 import sumolib
 
+from cavsumo.agents.recorded import Recorded
 from cavsumo.batch.replay import Record
 from cavsumo.errors import InputError
 from cavsumo.interop.fcd import write_fcd
@@ -48,7 +49,10 @@ def test_it_is_what_sumo_writes_itself(
             snapshot = world.step((), None)
             assert snapshot is not None
             snapshots.append(snapshot)
-    write_fcd(Trace(trace_head({}, {}, None, snapshots), [frame(s) for s in snapshots]), ours)
+    write_fcd(
+        Trace(trace_head({}, {}, None, snapshots, Recorded(0, ())), [frame(s) for s in snapshots]),
+        ours,
+    )
     frames, simulated = read(ours), read(theirs)
     entered = next(i for i, seen in enumerate(simulated) if "ego" in seen)
     assert len(simulated) - entered == len(frames) == 51

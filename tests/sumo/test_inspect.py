@@ -34,6 +34,12 @@ needs_netconvert = pytest.mark.skipif(
 )
 
 
+@pytest.fixture(autouse=True)
+def silent(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Nothing is said of steps that take long: what is said must not depend on the machine."""
+    monkeypatch.setattr("cavsumo.cli.steps.AFTER_S", 3600.0)
+
+
 @pytest.fixture(scope="module")
 def grid(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A town of 529 junctions and 2,024 edges, with pavements and crossings."""

@@ -233,7 +233,7 @@ def test_a_learners_episode_can_be_replayed(networks: dict[str, Path], tmp_path:
     run(settings | {"trace": "all", "end": 5.0}, file, Means(), Manner(quiet=True, exit_zero=True))
     assert replay(file, ReplayOptions(5)) == Exit.OK
     alone = file.with_suffix("") / "run000005.jsonl"
-    assert replay(alone) == Exit.OK  # what it knew before is in its trace
+    assert replay(alone, ReplayOptions()) == Exit.OK  # what it knew before is in its trace
 
 
 @pytest.mark.parametrize(
@@ -340,11 +340,67 @@ def test_one_changed_number_of_a_lone_trace_is_named(
     assert "diverged at the row: min_gap_m recorded '1.234'" in capsys.readouterr().err
 
 
+def test_a_trace_is_played_back_without_its_routes(
+    recording: Recording, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Its actions and departures are in it; the page is that of the record, byte for byte."""
+    file, pages = _sent(recording, tmp_path), [tmp_path / "a.html", tmp_path / "b.html"]
+    assert main(["replay", str(file), "--recorded", "--html", str(pages[0])]) == Exit.OK
+    (tmp_path / "crossing.rou.xml").unlink()
+    capsys.readouterr()
+    assert main(["replay", str(file), "--playback", "--html", str(pages[1])]) == Exit.OK
+    said, n = capsys.readouterr(), len(recording.frames)
+    verdict = recording.row["outcome"]
+    assert said.out == f"run 1 (timing): {verdict}, {n} frames: the same, played back\n"
+    assert said.err == ""
+    assert pages[0].read_bytes() == pages[1].read_bytes()
+
+
+def test_another_action_is_named_played_anew_and_back(
+    recording: Recording, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Anew the agent chooses otherwise than recorded; back the body goes elsewhere."""
+    file = _sent(recording, tmp_path)
+    lines = file.read_text(encoding="utf-8").splitlines()
+    frame = json.loads(lines[1 + 6])
+    frame["actions"][1][0] = min(1.4, frame["actions"][1][0] + 0.25)
+    frame["actions"][1][1] += 0.01
+    lines[1 + 6] = json.dumps(frame)
+    file.write_text("\n".join(lines) + "\n", encoding="utf-8")
+    assert main(["replay", str(file)]) == Exit.VIOLATED
+    assert "diverged at step 6 (0.600 s): tester1.throttle recorded" in capsys.readouterr().err
+    assert main(["replay", str(file), "--playback"]) == Exit.VIOLATED
+    assert "diverged at step 7 (0.700 s): tester1." in capsys.readouterr().err
+
+
+def test_a_trace_of_format_1_is_replayed_and_not_played_back(
+    recording: Recording, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """It holds no actions to compare or to play."""
+    file = _sent(recording, tmp_path)
+    head, *lines = map(json.loads, file.read_text(encoding="utf-8").splitlines())
+    head["format"] = "cavsumo-trace-1"
+    for key in ("starts", "waited", "departures", "approaches"):
+        del head[key]
+    for line in lines:
+        del line["actions"]
+    file.write_text("".join(json.dumps(line) + "\n" for line in (head, *lines)), encoding="utf-8")
+    assert main(["replay", str(file)]) == Exit.OK
+    assert "frames: the same\n" in capsys.readouterr().out
+    assert main(["replay", str(file), "--playback"]) == Exit.USAGE
+    said = capsys.readouterr().err
+    assert said == "cavsumo: --playback: the trace of run 1 is of format 1, without actions\n"
+
+
 @pytest.mark.parametrize(
     ("absent", "words"),
     [
         ("net", "needs 'crossing.net.xml' (sha256 a72e56a374a8), which is not here; name it with"),
-        ("routes", "needs 'crossing.rou.xml' (sha256 cfad45f80d2e), which is not here"),
+        (
+            "routes",
+            "(sha256 cfad45f80d2e), which is not here; name it with --routes FILE or put it "
+            "beside it, or play back who departed with --playback",
+        ),
         ("other", "not the 'crossing.net.xml' (sha256 a72e56a374a8) of"),
     ],
 )
@@ -380,7 +436,8 @@ def test_the_files_of_a_trace_can_be_named(
         ({"plan": {}}, "holds no valid plan"),
         ({"row": {"run": "x"}}, "holds no valid plan"),
         ({"memory_kept": False}, "had learned before, which is large"),
-        ({"format": "x"}, "line 1 is not the head"),
+        ({"format": "x"}, "format x, this version reads cavsumo-trace-1 and cavsumo-trace-2"),
+        ({"format": 7}, "line 1 is not the head"),
     ],
 )
 def test_heads_that_do_not_suffice_are_refused(
@@ -413,6 +470,7 @@ def test_an_episode_of_a_shared_simulation_is_not_replayed_alone(
         (["{trace}", "1"], "is the trace of one episode"),
         (["{csv}", "1", "--html", "no/such/page.html"], "no such folder 'no/such'"),
         (["{csv}", "1", "--fcd", "no/such/fcd.xml"], "no such folder 'no/such'"),
+        (["{csv}", "1", "--recorded", "--playback"], "name one of them"),
     ],
 )
 def test_replays_that_mean_nothing_are_refused(

@@ -100,6 +100,7 @@ def commands(sent: Sent) -> dict[str, list[str]]:
     return {
         "replay": ["replay", csv_file, sent.run],
         "replay trace": ["replay", trace],
+        "replay --playback": ["replay", trace, "--playback"],
         "replay --html": ["replay", trace, "--html", "page.html"],
         "replay --fcd": ["replay", csv_file, sent.run, "--fcd", "fcd.xml"],
         "certify": ["certify", csv_file, sent.run, "--runs", "1", "-q"],

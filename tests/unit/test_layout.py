@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import re
 import subprocess
 import sys
 from collections import defaultdict
@@ -174,6 +175,36 @@ def test_every_room_says_what_lives_there() -> None:
         text = ast.get_docstring(TREES[name])
         assert text, name
         assert len(text.splitlines()) <= 10, name
+
+
+def docstrings() -> Iterator[tuple[str, str]]:
+    """Every docstring of the package with the name of its module."""
+    kinds = (ast.Module, ast.ClassDef, ast.FunctionDef, ast.AsyncFunctionDef)
+    for module, tree in TREES.items():
+        for node in ast.walk(tree):
+            if isinstance(node, kinds) and (text := ast.get_docstring(node)):
+                yield module, text
+
+
+def test_a_docstring_begins_with_a_noun_or_a_verb() -> None:
+    """It names its subject instead of asking for it."""
+    begins = re.compile(r"(what|who)(ever|m|se)?\b", re.IGNORECASE)
+    assert [(module, text) for module, text in docstrings() if begins.match(text)] == []
+
+
+def test_sentences_name_their_subject() -> None:
+    """Neither the package nor the documentation writes of whatever, whoever or whom."""
+    root = PACKAGE.parent
+    files = [*PACKAGE.rglob("*.py"), *root.glob("*.md"), *root.glob("docs/*.md")]
+    files += [root / folder / "README.md" for folder in ("benchmarks", "experiments", "networks")]
+    word = re.compile(r"\b(whatever|whoever|whom)\b", re.IGNORECASE)
+    found = [
+        (str(file.relative_to(root)), line)
+        for file in files
+        for line in file.read_text(encoding="utf-8").splitlines()
+        if word.search(line)
+    ]
+    assert found == []
 
 
 def test_the_command_line_starts_light() -> None:

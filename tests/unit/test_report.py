@@ -422,7 +422,7 @@ def test_moments_of_a_trace(tmp_path: Path) -> None:
         | {"testers": {}, "background": {}, "lights": ""}
         for i, (x, y) in enumerate(places)
     ]
-    head = dict.fromkeys(("run", "agent", "ego", "seed", "outcome", "tester"), "")
+    head = {"format": "cavsumo-trace-1"}
     file = tmp_path / "t.jsonl"
     file.write_text(trace_text(head, frames), encoding="utf-8")
     moments = read_moments(file, [0.1, 0.26, 0.0])

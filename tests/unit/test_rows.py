@@ -13,6 +13,7 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
+from cavsumo.agents.recorded import Recorded
 from cavsumo.errors import ResultsError
 from cavsumo.model.bodies import CAR, PEDESTRIAN, Body
 from cavsumo.model.snapshot import BodyState, Snapshot
@@ -47,7 +48,7 @@ def seen(step: int, x: float = 1.0) -> dict[str, Any]:
 def played(run: int, *frames: dict[str, Any], **more: Any) -> Outcome:
     """The outcome of an episode, with a trace if there are frames."""
     mine = row(run, **more)
-    head = trace_head({"plan": {}}, mine, None, [snapshot(0)])
+    head = trace_head({"plan": {}}, mine, None, [snapshot(0)], Recorded(0, ()))
     return Outcome(mine, trace_text(head, frames) if frames else "")
 
 
@@ -204,7 +205,9 @@ def test_a_trace_begins_with_whose_it_is(tmp_path: Path) -> None:
 
 def test_a_trace_says_when_a_memory_was_left_out() -> None:
     """What an agent knew is kept unless it is large; then the head says so."""
-    heads = [trace_head({}, row(0), memory, []) for memory in ([0.5], [0.5] * 100_000)]
+    heads = [
+        trace_head({}, row(0), memory, [], Recorded(0, ())) for memory in ([0.5], [0.5] * 100_000)
+    ]
     assert [head["memory"] for head in heads] == [[0.5], None]
     assert [head["memory_kept"] for head in heads] == [True, False]
 
@@ -245,6 +248,7 @@ def test_a_frame_holds_every_body() -> None:
         "testers": {"tester0": [5.0, 6.0, 1.0, -0.5]},
         "background": {"car0": [9.0, 9.0, 9.0, 3.0]},
         "lights": "",
+        "actions": [],
     }
 
 

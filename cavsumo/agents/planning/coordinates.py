@@ -1,7 +1,6 @@
-"""What matters between a walking tester and the ego: four numbers, wherever the roads lead.
+"""Relative coordinates of a walking tester and the ego: four numbers, independent of the roads.
 
-The ego comes along its path and the body along its way across; the two meet at one point. How the
-network lies around it does not matter any more.
+The ego follows its path and the body its way across; the two meet at one point.
 """
 
 from __future__ import annotations
@@ -16,13 +15,14 @@ from cavsumo.model.snapshot import BodyState, Snapshot
 
 
 class Meeting(NamedTuple):
-    """Where a body's way meets the ego's path.
+    """The point where a body's way meets the ego's path.
 
     Attributes:
         way: the body's way.
         along: arc length of the point on the ego's path [m].
-        strip: how far along its way the body's front touches the strip that the ego sweeps [m].
-        width: how far it goes on from there until its back has left the strip [m].
+        strip: distance along its way at which the body's front touches the strip that the ego
+            sweeps [m].
+        width: further distance until its back has left the strip [m].
     """
 
     way: Crossing
@@ -32,7 +32,7 @@ class Meeting(NamedTuple):
 
 
 def meeting(scene: Scene, index: int) -> Meeting | None:
-    """Where the way of a body meets the ego's path; None where it has none, or it does not."""
+    """The meeting of a body's way with the ego's path; None without a way or a meeting."""
     way, start, kind = scene.way(index), scene.starts[index], scene.bodies[index].kind
     met = scene.ego_path.meet(start.x, start.y, way.heading) if way else None
     if way is None or met is None:
@@ -47,11 +47,11 @@ class Relative(NamedTuple):
     Attributes:
         gap: distance along the ego's path from its front to the near side of the body at the
             meeting point, negative once the front is beyond that [m].
-        left: how far the body has to walk until its front touches the strip that the ego sweeps,
-            with the longer way of the turn; within the strip and beyond it negative [m].
+        left: distance that the body has to walk until its front touches the strip that the ego
+            sweeps, with the detour of the turn; negative within the strip and beyond it [m].
         v: speed of the ego [m/s].
-        walk: speed of the body, in whatever direction it faces [m/s].
-        turn: how far it has to turn to walk along its way, in (-pi, pi] [rad].
+        walk: speed of the body, in any direction [m/s].
+        turn: turn that it needs to walk along its way, in (-pi, pi] [rad].
     """
 
     gap: float
@@ -65,8 +65,8 @@ class Coordinates:
     """Maps snapshots to one body's relative state.
 
     Attributes:
-        meeting: where its way meets the ego's path, None where it does not: then it has no
-            relative state.
+        meeting: the meeting of its way with the ego's path; without one (None) it has no relative
+            state.
         kind: of the body.
     """
 
@@ -77,7 +77,7 @@ class Coordinates:
         self._front = scene.ego.kind.length / 2 + self.kind.width / 2
 
     def __call__(self, snapshot: Snapshot) -> Relative | None:
-        """The relative state now; one projection on the ego's path, shared with everybody."""
+        """The relative state now; uses the projection on the ego's path that all bodies share."""
         if self.meeting is None:
             return None
         state = snapshot.testers[self.index]
@@ -85,7 +85,7 @@ class Coordinates:
         return Relative(gap, self.left(state), snapshot.ego.v, state.v, self._turn(state))
 
     def left(self, state: BodyState) -> float:
-        """How far the body has to walk to the ego's strip (``Relative.left``) [m]."""
+        """The distance that the body has to walk to the ego's strip (``Relative.left``) [m]."""
         assert self.meeting is not None
         way = self.meeting.way
         left = self.meeting.strip - way.progress(state.x, state.y)

@@ -1,11 +1,11 @@
-"""What a body can still force from where it is, against a class of egos.
+"""Whether a body can still force its goal from its state, against a class of egos.
 
-Far from the strip the body walks on: nothing is lost by that, as it may stand there as well as
-anywhere. The table of the solved game begins a few metres before the strip.
+Far from the strip the body walks on, which loses nothing, since it may also stand later. The table
+of the solved game begins a few metres before the strip.
 
-Forcing is monotone, and one ego is the worst for every body at once: an ego that never stops must
-drive its reaction zone onto whoever stands in its way, so all it can do is to come too fast. So
-several bodies force together what one of them forces alone, and there is no joint game to solve.
+Forcing is monotone, and one ego is the worst for all bodies: the reaction zone of an ego that never
+stops must reach a body that stands in its way, so its only defence is to arrive too fast. Several
+bodies therefore force together only what one of them forces alone, and no joint game is solved.
 """
 
 from __future__ import annotations
@@ -17,11 +17,11 @@ from cavsumo.agents.planning.solved import Solved
 from cavsumo.model.bodies import Kind
 
 LEAST_MPS = 0.1  # an ego slower than that is taken as standing: it has no zones
-ROOM_M = 0.2  # the table is left alone where rounding up could lead off it
+ROOM_M = 0.2  # margin at which rounding up could lead off the table
 
 
 class Forceability:
-    """Judges relative states of one body; subclasses say what the ego may do.
+    """Values of relative states of one body; subclasses define the actions of the ego.
 
     Args:
         kind: of the body.
@@ -57,7 +57,7 @@ class Forceability:
         raise NotImplementedError
 
     def walked(self, here: Relative, until: float) -> tuple[float, float, float]:
-        """Time until so much is left to walk, and what is left and how fast it is then.
+        """Time until a distance is left to walk, and the distance and the speed at that time.
 
         The body's position follows its speed one timestep late (explicit Euler); measured half a
         timestep of its speed farther it moves exactly as on the lattice.
@@ -75,7 +75,7 @@ class Forceability:
 
 
 class ConstantSpeed(Forceability):
-    """Against an ego that keeps its speed, whatever that is."""
+    """Against an ego that keeps its speed."""
 
     def _on_table(self, here: Relative, late: float) -> tuple[float, float, float, float] | None:
         if here.gap <= 0.0:
@@ -86,7 +86,7 @@ class ConstantSpeed(Forceability):
 
 
 class Free(Forceability):
-    """Against an ego that brakes and accelerates as it likes, but never stops."""
+    """Against an ego that brakes and accelerates freely, but never stops."""
 
     def _on_table(self, here: Relative, late: float) -> tuple[float, float, float, float] | None:
         t, left, walk = self.walked(here, self.edge)
@@ -94,7 +94,8 @@ class Free(Forceability):
         return (gap, v, left, walk) if gap > 0.0 else None
 
     def possible(self, here: Relative) -> bool:
-        # Far away the ego may come slower than at worst: then only what is lost now is lost.
+        # Far away the ego may arrive slower than at worst: then only a goal that is lost now is
+        # lost.
         if here.left <= self.edge or here.v <= LEAST_MPS:
             return super().possible(here)
         return here.gap > 0.5 * here.v * here.v / self.max_decel
@@ -114,10 +115,10 @@ class Free(Forceability):
 
 
 class Unaware(Free):
-    """Against one that keeps its speed until the body is on the carriageway, then does as it likes.
+    """Against an ego that keeps its speed until the body is on the carriageway, then acts freely.
 
     Args:
-        kerb: how far the body has to walk to the strip once it touches the carriageway [m].
+        kerb: distance from touching the carriageway to the strip [m].
     """
 
     def __init__(self, kind: Kind, table: Solved, max_decel: float, dt: float, kerb: float) -> None:

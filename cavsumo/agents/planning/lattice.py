@@ -6,9 +6,9 @@ one on its way there (gap, speed, distance left, pace). All of them lie in order
 shrinks with every step, so a play never comes back to a state.
 
 Actions of the tester: 0 stand (or brake), 1 walk on. Actions of the ego: the change of its speed.
-Within an interval both accelerations are constant, so when the body's front touches the strip, and
-how far the zones are then, is computed and not rounded. A body that comes into the strip before the
-reaction zone stands there: an ego that never stops has to drive its reaction zone onto it.
+Within an interval both accelerations are constant, so the time at which the body's front touches
+the strip, and the zones at that time, are computed exactly. A body that enters the strip before the
+reaction zone stands there: the reaction zone of an ego that never stops must reach it.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ Array = Any  # of numpy, whose shapes and types change from line to line here
 
 @dataclass(frozen=True)
 class Steps:
-    """What a step from every state under every pair of actions leads to."""
+    """The result of a step from every state under every pair of actions."""
 
     successor: Array
     reward: Array
@@ -39,8 +39,8 @@ def build(rules: Rules, *, trapped: bool) -> Game:
     """The game of some rules.
 
     Args:
-        trapped: what is missed stays missed, for the question from where the goal can be forced;
-            else it ends at its price, so that there is a value everywhere.
+        trapped: a missed test stays missed, to compute from where the goal can be forced; otherwise
+            it ends at its price, so that every state has a value.
     """
     gaps, speeds, lefts, paces = rules.shape
     standing, walking = _standing(rules), _walking(rules)
@@ -80,7 +80,7 @@ def _ego(rules: Rules, gap: Array, speed: Array) -> tuple[Array, ...]:
 
 
 def slack(rules: Rules, gap: Array, v: Array) -> Array:
-    """How far the braking zone is from the body [m]."""
+    """Distance of the braking zone from the body [m]."""
     return gap - (0.5 * v * v / rules.max_decel if rules.max_decel else 0.0)
 
 
@@ -146,7 +146,7 @@ def _walk(rules: Rules, gap: Array, speed: Array, left: Array, pace: Array, chan
 
 
 def _entry(rules: Rules, left: Array, pace: Array, after: Array) -> Array:
-    """When the body's front touches the strip, infinite if not at this acceleration [s]."""
+    """Time at which the body's front touches the strip, infinite if never [s]."""
     unit = rules.walk_accel * rules.interval
     w, a = pace * unit, (after - pace) * unit / rules.interval
     root = np.sqrt(np.maximum(w * w + 2.0 * a * left, 0.0))
@@ -156,7 +156,7 @@ def _entry(rules: Rules, left: Array, pace: Array, after: Array) -> Array:
 
 
 def _number(rules: Rules, gap: Array, speed: Array, left: Array, pace: Array) -> Array:
-    """The number of a walking state, of those alone; anything for what is none."""
+    """The number of a walking state among these; arbitrary for other states."""
     _, speeds, lefts, paces = rules.shape
     gap, left = np.clip(gap, 0, None), np.clip(left, 0, None)
     return ((gap * speeds + speed) * lefts + left[..., None]) * paces + pace[..., None]

@@ -1,14 +1,14 @@
-"""A model of the ego by counting: when it changes its acceleration, and what it takes then.
+"""A model of the ego by counting: when it changes its acceleration, and to which value.
 
 The ego's transition function is unknown but can be sampled (seed, section 2). Drivers do not decide
-in every timestep: SUMO's hold an acceleration for their ``actionStepLength``. So two things are
-counted, both seen from outside:
+in every timestep: SUMO's hold an acceleration for their ``actionStepLength``. Two observable
+quantities are counted:
 
 * in how many timesteps with an acceleration of age ``held`` it was changed (a hazard), and
 * which acceleration was taken, for each situation: how soon the body enters the strip that the ego
   sweeps, the deceleration needed to stop before it, the ego's speed.
 
-Where little was counted, coarser situations speak: a situation's distribution is its counts plus
+Situations with few counts use coarser ones: a situation's distribution is its counts plus
 ``PSEUDO`` counts of the next coarser one (any speed; any entry from the lane; any deceleration
 needed), and last of "it keeps its speed".
 """
@@ -26,7 +26,7 @@ ENTRY_S = (0.05, 0.25, 0.45, 0.65, 0.85, 1.15)
 ON_THE_LANE = 4  # cells of entry in which the ego's driver sees the body before it, all alike
 NEED_MPS2 = (0.5, 1.5, 3.0, 4.5, 6.5, 9.0)
 SPEED_MPS = (1.0, 3.0, 6.0)
-# Classes of acceleration, and what stands for a class in which nothing was counted [m/s2].
+# Classes of acceleration, and the default mean of a class without counts [m/s2].
 EDGES_MPS2 = (-6.5, -3.0, -1.0, -0.3, 0.3)
 MIDDLES_MPS2 = (-8.0, -4.5, -2.0, -0.6, 0.0, 1.0)
 KEEPS = 4  # the class of an ego that keeps its speed
@@ -43,7 +43,8 @@ def situation(entry_s: float, gap: float, v: float) -> Key:
     """The cell of a situation.
 
     Args:
-        entry_s: until the body enters the ego's strip [s]; infinite if it is not on its way there.
+        entry_s: time until the body enters the ego's strip [s]; infinite if it is not on its way
+            there.
         gap: from the ego's front to the body's near side, along the ego's path [m].
         v: speed of the ego [m/s].
     """
@@ -67,8 +68,8 @@ class AccelerationReader:
 
     Attributes:
         acceleration: in the last timestep [m/s2].
-        held: for how many timesteps before the last one it had been the same, at most OLDEST.
-        changed: whether it was chosen anew in the last timestep; None where that cannot be seen.
+        held: number of timesteps before the last one with the same acceleration, at most OLDEST.
+        changed: whether it was chosen anew in the last timestep; None if that cannot be observed.
     """
 
     def __init__(self, dt: float) -> None:
@@ -85,7 +86,7 @@ class AccelerationReader:
             return
         a, was = (v - before) / self.dt, self.acceleration
         self.acceleration, self.changed = a, None
-        if v <= STANDING_MPS:  # it may decide what it likes, it stands
+        if v <= STANDING_MPS:  # its decisions cannot be observed while it stands
             self.held = OLDEST
         elif self._known:
             self.changed = abs(a - was) > CHANGE_MPS2
@@ -94,7 +95,7 @@ class AccelerationReader:
 
 
 class Counts:
-    """What was counted so far.
+    """The counts so far.
 
     Attributes:
         ages: [aware][held] -> [timesteps in which it was held, in which it was changed].
@@ -163,7 +164,7 @@ class Counts:
         """Lower bounds that hold for all classes of a situation together (Clopper-Pearson).
 
         One-sided at (1 - confidence) / classes each, from the counts of that situation alone;
-        what they leave of 1 may lie on any class.
+        the rest of 1 may lie on any class.
         """
         from scipy.stats import beta
 
@@ -178,7 +179,7 @@ class Counts:
 
     @classmethod
     def of(cls, data: Mapping[str, Any]) -> Counts:
-        """The counts of plain data; ValueError, KeyError or TypeError if it is none."""
+        """The counts from plain data; ValueError, KeyError or TypeError for invalid data."""
         counts = cls()
         counts.ages = [[[_count(n) for n in pair] for pair in ages] for ages in data["ages"]]
         counts.sums = [[float(total), _count(n)] for total, n in data["sums"]]
@@ -196,7 +197,7 @@ class Counts:
 
 
 def _count(n: int) -> int:
-    """A number of times; ValueError if it is none."""
+    """A count; ValueError for anything else."""
     if n != int(n) or n < 0:
         raise ValueError(f"expected a count, got {n!r}")
     return int(n)

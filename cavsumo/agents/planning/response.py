@@ -4,16 +4,16 @@ Player 2 has one action (or, for a robust plan, may bend the counts within their
 A state is (entry, zeta, v, held, class):
 
 * ``entry``: timesteps until the body enters the strip that the ego sweeps if it walks now. Walking
-  makes it one less, exactly, whatever the body's speed; standing leaves it as it is (braking from
+  reduces it by exactly one, at any speed of the body; standing leaves it as it is (braking from
   full speed it first falls and then grows again by as much). Below 0 it is in the strip.
 * ``zeta = (e - d_b) / s``: the gap e left when the body enters if the ego keeps its speed, less the
   braking zone d_b = v^2 / (2 b), in lengths s of the reaction zone. A fair test has 0 < zeta <= 1.
-  An ego that keeps its speed keeps its zeta while the body walks, so the grid does not blur it.
+  An ego that keeps its speed keeps its zeta while the body walks, without interpolation error.
 * ``v``: speed of the ego; zeta and v are interpolated, the others are exact.
 * ``held``, ``class``: for how long the ego has had its acceleration, and which (``opponent``).
 
-In each timestep the ego keeps its acceleration or chooses anew, by the counts. Ends are priced: the
-tester earns 0 for what it aims at and minus a price otherwise.
+In each timestep the ego keeps its acceleration or chooses anew, by the counts. Outcomes have
+prices: the tester earns 0 for its aim and minus a price otherwise.
 """
 
 from __future__ import annotations
@@ -42,8 +42,8 @@ Ints = NDArray[np.int64]
 
 MAX_DECEL, REACTION_TIME = 9.0, 0.675  # of the zones aimed at, as in the reaction-zone assertion
 SLOWEST_MPS = 2.2  # below this speed the reaction zone is measured as at this speed
-BEFORE_S, INSIDE_S = 1.4, 1.2  # how long before and after the entry the grid reaches
-COMMITTED_S = 0.8  # from here on the body walks: it could hardly stop any more
+BEFORE_S, INSIDE_S = 1.4, 1.2  # extent of the grid before and after the entry
+COMMITTED_S = 0.8  # from here on the body walks, since it could hardly stop any more
 SPEEDS = np.array([0.0, 1.5, 3.5, 5.5, 8.0, 11.0, 14.0])  # m/s
 ZETAS = np.linspace(-0.9, 2.7, 13)
 CERTAIN = 0.9  # an acceleration whose hazard is above this gets no older in the model
@@ -57,7 +57,7 @@ BEHIND_M = 5.5  # an ego whose front is so far beyond the body has passed it
 
 
 class Prices(NamedTuple):
-    """What the ends cost the tester; what it aims at costs nothing.
+    """The prices of the outcomes for the tester; its aim costs nothing.
 
     Attributes:
         held: a test that the ego passed.
@@ -72,12 +72,12 @@ class Prices(NamedTuple):
 
 @dataclass(frozen=True)
 class Aim:
-    """What is aimed at.
+    """The aim of the tester.
 
     Attributes:
         violation: a violation after a fair precondition; else the precondition.
         prices: of the other ends.
-        confidence: of the sets around the counts; None to trust the counts.
+        confidence: of the sets around the counts; None to use the counts as they are.
     """
 
     violation: bool = True
@@ -141,12 +141,12 @@ def grid_for(counts: Counts, dt: float) -> Grid:
 
 
 class Counted(NamedTuple):
-    """What was counted, as arrays.
+    """The counts as arrays.
 
     Attributes:
         hazard: [aware, age] probability that the ego decides.
-        chances: [entry cell, need cell, speed cell, class] what it takes then, at least; the rest
-            of 1 lies where it is worst for the tester.
+        chances: [entry cell, need cell, speed cell, class] least probability of each class then;
+            the rest of 1 lies on the class that is worst for the tester.
         middles: [class] accelerations [m/s2].
     """
 
@@ -198,7 +198,7 @@ def situations(states: States, dt: float) -> tuple[Ints, Ints, Ints]:
 
 
 def deciding(states: States, model: Counted, dt: float) -> tuple[Floats, Floats]:
-    """Probability that the ego decides, shape (n,), and what it takes then, (n, classes)."""
+    """Probability that the ego decides, shape (n,), and those of the classes then, (n, classes)."""
     cells = situations(states, dt)
     near = (cells[0] < len(ENTRY_S)).astype(int)
     held = np.minimum(states.held, model.hazard.shape[1] - 1)
@@ -206,7 +206,7 @@ def deciding(states: States, model: Counted, dt: float) -> tuple[Floats, Floats]
 
 
 class Moved(NamedTuple):
-    """What a timestep leads to: with probability ``over`` to an end of that mean price."""
+    """The result of a timestep: with probability ``over`` an end of that mean price."""
 
     states: States
     over: Floats
@@ -243,11 +243,11 @@ def _ends_outside(after: States, grid: Grid, aim: Aim) -> tuple[Floats, Floats]:
 def _ends_inside(
     after: States, entering: NDArray[np.bool_], grid: Grid, aim: Aim
 ) -> tuple[Floats, Floats]:
-    """Ends in the strip; where the body enters, the zone that it meets is blurred by a timestep."""
+    """Ends in the strip; the zone that the body meets on entering is uncertain by a timestep."""
     prices, v, gap = aim.prices, after.v, after.gap
     blur = np.maximum(0.1, v * grid.dt / 2.0)
     early = np.clip((braking(v) + blur - gap) / (2.0 * blur), 0.0, 1.0) * entering
-    early = np.where(v <= STANDING_MPS, 0.0, early)  # nobody is in the zones of a standing ego
+    early = np.where(v <= STANDING_MPS, 0.0, early)  # a standing ego has no zones
     spoilt = np.where(gap < -BEHIND_M, prices.missed, prices.unfair)
     if aim.violation:
         good = (gap <= 0.0) & (v > STANDING_MPS)
@@ -260,7 +260,7 @@ def _ends_inside(
 
 
 def zeta_of(states: States, dt: float) -> Floats:
-    """Where in the zones the body enters, or is."""
+    """Position in the zones at which the body enters, or is."""
     left = states.gap - states.v * np.maximum(states.entry, 0.0) * dt
     zeta: Floats = (left - braking(states.v)) / scale(states.v)
     return zeta
@@ -285,17 +285,17 @@ def corners(states: States, which: Ints, grid: Grid) -> tuple[Ints, Floats]:
 
 
 def _between(x: Floats, axis: Floats) -> tuple[Ints, Floats]:
-    """The place on an axis below each x, clipped to its ends, and how far it is to the next."""
+    """The index on an axis below each x, clipped to its ends, and the fraction to the next."""
     i = np.clip(np.searchsorted(axis, x, side="right") - 1, 0, len(axis) - 2)
     return i, np.clip((x - axis[i]) / (axis[i + 1] - axis[i]), 0.0, 1.0)
 
 
 class Backup(NamedTuple):
-    """What some moves are worth, by what the ego does.
+    """The values of some moves, by the decision of the ego.
 
     Attributes:
         decides: probability that it chooses anew, shape (n,).
-        chances: [n, class] how likely it takes each at least; the rest of 1 lies where it is worst.
+        chances: [n, class] least probability of each; the rest of 1 lies on the worst class.
         keeps: worth if it keeps its acceleration, shape (n,).
         takes: [n, class] worth if it takes one.
     """
@@ -307,7 +307,7 @@ class Backup(NamedTuple):
 
     @property
     def worth(self) -> Floats:
-        """Expected, with the worst of what the counts leave open."""
+        """The expected value, in the worst case that the counts permit."""
         rest = 1.0 - self.chances.sum(axis=1)
         takes = (self.chances * self.takes).sum(axis=1) + rest * self.takes.min(axis=1)
         worth: Floats = (1.0 - self.decides) * self.keeps + self.decides * takes
@@ -319,8 +319,8 @@ class Plan:
     """A best response, solved or being solved.
 
     Attributes:
-        grid, aim, model: what is solved.
-        value: of each state, less than 0 by the prices to expect, flat.
+        grid, aim, model: of the decision process.
+        value: of each state, minus the expected price, flat.
     """
 
     grid: Grid

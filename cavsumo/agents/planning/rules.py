@@ -1,4 +1,4 @@
-"""What a game of a walking tester against an ego depends on: nothing but these numbers."""
+"""The parameters of a game of a walking tester against an ego."""
 
 from __future__ import annotations
 
@@ -11,12 +11,12 @@ from dataclasses import dataclass
 from cavsumo.model.bodies import Kind
 
 INTERVAL_S = 0.5  # between two decisions of the lattice
-VERSION = 1  # of the construction; another one makes stored solutions void
+VERSION = 1  # of the construction; a new version invalidates stored solutions
 
 
 @dataclass(frozen=True)
 class Rules:
-    """A lattice on which walking and driving are exact, and what is won and lost.
+    """A lattice on which walking and driving are exact, with the prices of the outcomes.
 
     Both players keep an acceleration for an interval D. Speeds are multiples of a D, so the ways
     are multiples of a D^2 / 2 and no step ever has to be rounded.
@@ -80,7 +80,7 @@ class Rules:
 def against_constant(
     kind: Kind, reaction_time: float, left_max: float, price: float, step: float
 ) -> Rules:
-    """The game against an ego that keeps its speed, whatever that is.
+    """The game against an ego that keeps its speed.
 
     Gaps are counted from the end of the braking zone and in seconds, so there is only one speed, 1.
 
@@ -116,7 +116,7 @@ def against_any(
     left_max: float,
     price: float,
 ) -> Rules:
-    """The game against an ego that brakes and accelerates as it likes, but never stops.
+    """The game against an ego that brakes and accelerates freely, but never stops.
 
     Args:
         top: the speed that it never exceeds [m/s], rounded up to a step.

@@ -1,7 +1,7 @@
-"""A solved game as a table: where its goal is sure, and what every state is worth.
+"""A solved game as a table: the states from which its goal is sure, and all values.
 
 Solutions are kept on disk, by the hash of the rules, so that a worker finds what its parent solved.
-Nothing but time depends on whether they are there.
+Stored solutions save time and do not change results.
 """
 
 from __future__ import annotations
@@ -51,7 +51,7 @@ class Solved:
     def possibly(self, gap: float, v: float, left: float, walk: float) -> bool:
         """Whether it is sure at the best corner; if not, it can be forced from nowhere around."""
         i, j, k, m = self._cell(gap, v, left, walk)
-        if k < SNAP:  # that corner is at the strip: only the zones matter, which never recede
+        if k < SNAP:  # that corner is at the strip, where only the zones count, which never recede
             decel = self.rules.max_decel
             return gap > (0.5 * v * v / decel if decel else 0.0)
         j = min(j, float(self.rules.speeds - 1))
@@ -82,7 +82,7 @@ class Solved:
         return total
 
     def _cell(self, gap: float, v: float, left: float, walk: float) -> tuple[float, ...]:
-        """Where a state lies, in steps of the lattice."""
+        """The position of a state, in steps of the lattice."""
         rules = self.rules
         return (
             gap / rules.gap_step - 1.0,
@@ -101,7 +101,7 @@ class Solved:
 
 @lru_cache(maxsize=16)
 def solved(rules: Rules) -> Solved:
-    """The solution of a game: known to this process, found on disk, or solved now."""
+    """The solution of a game: from this process, from disk, or solved now."""
     size = math.prod(rules.shape)
     found = _read(_file(rules), size)
     if found is None:
@@ -124,14 +124,14 @@ def _solve(rules: Rules) -> bytes:
 
 
 def cache_folder() -> Path:
-    """Where solutions are kept: ``$XDG_CACHE_HOME/cavsumo`` or ``~/.cache/cavsumo``."""
+    """The folder of the solutions: ``$XDG_CACHE_HOME/cavsumo`` or ``~/.cache/cavsumo``."""
     home = os.environ.get("XDG_CACHE_HOME", "")
     base = Path(home) if Path(home).is_absolute() else Path.home() / ".cache"
     return base / "cavsumo"
 
 
 def _file(rules: Rules) -> Path | None:
-    """The file of a solution; with compiled sweeps another, as the last digits differ."""
+    """The file of a solution; a different one with compiled sweeps, as the last digits differ."""
     compiled = "-numba" if find_spec("numba") else ""
     try:
         return cache_folder() / f"game-{rules.key[:32]}{compiled}.bin"
@@ -140,7 +140,7 @@ def _file(rules: Rules) -> Path | None:
 
 
 def _read(file: Path | None, size: int) -> bytes | None:
-    """The solution in a file, None where there is no whole one: a checksum goes before it."""
+    """The solution in a file, None if it is incomplete: a checksum precedes it."""
     with suppress(OSError):
         data = file.read_bytes() if file else b""
         check, body = data[:32], data[32:]
@@ -150,7 +150,7 @@ def _read(file: Path | None, size: int) -> bytes | None:
 
 
 def _write(file: Path | None, body: bytes) -> None:
-    """Keep a solution, all of it at once; where that is impossible, do without."""
+    """Store a solution atomically; if that is impossible, continue without."""
     if file is None:
         return
     with suppress(OSError):

@@ -58,7 +58,8 @@ def unsolved(counts: Counts, dt: float, aim: Aim) -> Plan:
 def chain(plan: Plan) -> None:
     """Back up the values of the body that cannot stop any more, from the strip to the kerb.
 
-    The grid blurs what the ego does in the strip; for sets of egos there is nothing better.
+    The grid adds an interpolation error in the strip; for sets of egos there is no exact
+    alternative.
     """
     grid = plan.grid
     for entry in range(-grid.inside, grid.committed + 1):
@@ -69,7 +70,7 @@ def chain(plan: Plan) -> None:
 
 
 def roll_out(plan: Plan) -> None:
-    """Values of the body that cannot stop any more by simulation, which no grid blurs.
+    """Values of the body that cannot stop any more by simulation, without interpolation errors.
 
     Of the last two entries only, as no decision leads beyond them. The standard error of a value is
     at most half the largest price by the root of ROLLOUTS; always the same random numbers.
@@ -82,7 +83,7 @@ def roll_out(plan: Plan) -> None:
 
 
 def _played(plan: Plan, states: States, which: Ints, rng: np.random.Generator) -> Floats:
-    """What one walk into the strip earned from each state; all meet the same luck."""
+    """The reward of one walk into the strip from each state, all with the same random numbers."""
     grid, model = plan.grid, plan.model
     worth, left, alive = np.zeros(len(which)), np.ones(len(which)), np.arange(len(which))
     a = model.middles[which]
@@ -103,7 +104,7 @@ def _played(plan: Plan, states: States, which: Ints, rng: np.random.Generator) -
 
 
 def _slice(grid: Grid, entry: int) -> slice:
-    """Where the states with an entry are."""
+    """The slice of the states with an entry."""
     return slice((entry + grid.inside) * grid.layer, (entry + grid.inside + 1) * grid.layer)
 
 
@@ -119,8 +120,8 @@ def layer(grid: Grid, entry: int) -> tuple[States, Ints]:
 def response_game(plan: Plan) -> Game:
     """The game while the body can still stop; its last state, the goal, is the end of that.
 
-    What the committed body can expect (``plan.value``) is the reward of going there. Player 2 has
-    one action for each class on which the ego may put what the counts leave open, else one.
+    The expected value of the committed body (``plan.value``) is the reward of going there. Player 2
+    has one action for each class on which the ego may put the remaining probability, else one.
     """
     from scipy.sparse import csr_matrix
 
@@ -171,7 +172,7 @@ def _some(states: States, places: Any) -> States:
 def _branch(
     plan: Plan, states: States, action: Ints, k: int, which: Ints
 ) -> tuple[Ints, Floats, Floats]:
-    """Successors in the game and their shares, both (9, n), and the mean price of what ends.
+    """Successors in the game and their shares, both (9, n), and the mean price of the ends.
 
     Class -1 is that the ego keeps its acceleration; ``which``: the class that it has then.
     """

@@ -1,4 +1,4 @@
-"""What a formula is made of: frozen records, each with its place in the text.
+"""The nodes of a formula: frozen records, each with its position in the text.
 
 Numbers are ``Number``, ``Signal``, ``Arithmetic`` and ``Function``; all others are true or false.
 """
@@ -93,7 +93,7 @@ class Conditional:
 
 @dataclass(frozen=True, slots=True)
 class Interval:
-    """From when to when, relative to now [s]."""
+    """An interval relative to now [s]."""
 
     begin: float = 0.0
     end: float = math.inf

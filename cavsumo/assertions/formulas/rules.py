@@ -1,4 +1,4 @@
-"""A formula as a rule of an episode: what triggers it and how it is judged."""
+"""A formula as a rule of an episode: its trigger and its evaluation."""
 
 from __future__ import annotations
 
@@ -15,8 +15,8 @@ from cavsumo.assertions.formulas.nodes import (
     Until,
     walk,
 )
-from cavsumo.assertions.formulas.semantics import steps_of
 from cavsumo.assertions.formulas.signals import SIGNALS
+from cavsumo.assertions.formulas.steps import steps_of
 from cavsumo.assertions.formulas.syntax import parse
 from cavsumo.assertions.formulas.words import Text
 from cavsumo.errors import InputError
@@ -44,10 +44,11 @@ class Rule:
 
     Attributes:
         name, text: as given.
-        whole: what is judged at the first timestep of an episode.
-        lasting: what must hold at every timestep for that, if it needs no other timestep to say so.
+        whole: the formula evaluated at the first timestep of an episode.
+        lasting: the formula that must hold at every timestep for that, if it refers to no other
+            timestep.
         occasion: when it is triggered; None: every episode is a test.
-        signals: the names of those that it looks at.
+        signals: the names of the signals that it uses.
         dt: the timestep [s].
     """
 
@@ -60,7 +61,7 @@ class Rule:
     dt: float
 
     def place(self, at: int) -> str:
-        """Where a letter of its text stands."""
+        """The position of a letter of its text, in words."""
         return Text(f"formula {self.name}", self.text).place(at)
 
 
@@ -84,12 +85,12 @@ def rule(name: str, text: str, dt: float) -> Rule:
 
 
 def _temporal(node: TruthNode) -> bool:
-    """Whether it speaks of other timesteps."""
+    """Whether it refers to other timesteps."""
     return any(isinstance(part, Temporal | Until) for part in walk(node))
 
 
 def _lasting(whole: TruthNode) -> TruthNode | None:
-    """What ``always`` asks of each timestep alone."""
+    """The formula that ``always`` requires of each timestep alone."""
     if isinstance(whole, Temporal) and whole.op == "always" and not _temporal(whole.of):
         return whole.of if (whole.within.begin, whole.within.end) == (0.0, float("inf")) else None
     return None

@@ -1,4 +1,4 @@
-"""What a formula means: its robustness at every timestep of a trace, as far as it is known.
+"""The semantics of formulas: bounds on the robustness at every timestep of a trace.
 
 Signal temporal logic (Maler and Nickovic 2004) with the robustness of Donze and Maler (2010, space
 robustness) in discrete time, pointwise at the timesteps::
@@ -11,19 +11,18 @@ robustness) in discrete time, pointwise at the timesteps::
     rob(f until[a,b] g)(i)    = max of min(rob(g)(j), min of rob(f)(k) for i <= k < j)
                                                   for j in i + [a, b]
 
-historically, once and since are their mirror images in the past; before the first timestep there is
-nothing, so that ``once`` is false there and ``historically`` true.
+historically, once and since are their mirror images in the past; there are no timesteps before the
+first one, so that over an empty interval ``once`` is false and ``historically`` true.
 
-**The sign is the verdict.** Robustness is never 0: where a comparison sits on its bound it is the
-smallest number there is, positive where the comparison holds (>=, <=, ==) and negative where it
-does not (>, <, !=).
+**The sign is the verdict.** Robustness is never 0: on the bound of a comparison it is the smallest
+positive number if the comparison holds there (>=, <=, ==), and its negative otherwise (>, <, !=).
 
-**The end of a trace.** What follows the last timestep is unknown, so robustness is an interval from
-its least to its greatest value over all continuations (Deshmukh et al. 2017, robust satisfaction
-intervals). When the trace is ``closed``, because the episode is over, operators without an upper
-bound speak of the timesteps of the episode alone (the neutral view of Eisner et al. 2003), while
-what an operator [a, b] would still see behind the end stays unknown. The greatest value is then the
-weak view: only what the episode itself refutes is below zero.
+**The end of a trace.** The continuation is unknown, so robustness is an interval from its least to
+its greatest value over all continuations (Deshmukh et al. 2017, robust satisfaction intervals).
+When the trace is ``closed``, because the episode is over, operators without an upper bound range
+over the timesteps of the episode alone (the neutral view of Eisner et al. 2003), while the values
+of an operator [a, b] beyond the end stay unknown. The greatest value is then the weak view: it is
+negative only if the episode itself violates the formula.
 """
 
 from __future__ import annotations
@@ -43,7 +42,6 @@ from cavsumo.assertions.formulas.nodes import (
     Connective,
     Constant,
     Function,
-    Interval,
     Not,
     Number,
     NumberNode,
@@ -52,15 +50,15 @@ from cavsumo.assertions.formulas.nodes import (
     TruthNode,
     Until,
 )
+from cavsumo.assertions.formulas.steps import steps_of
 from cavsumo.assertions.formulas.windows import Values, largest_ahead
 
 Trace = Mapping[str, Values]
 TINY = sys.float_info.min  # the smallest number that is kept at full precision
-STEP_TOLERANCE = 1e-9  # of a timestep
 
 
 class Bounds(NamedTuple):
-    """The least and the greatest robustness at each timestep, whatever follows the trace."""
+    """The least and the greatest robustness at each timestep over all continuations."""
 
     least: Values
     greatest: Values
@@ -72,7 +70,7 @@ class Bounds(NamedTuple):
 
 
 class NoNumber(ArithmeticError):
-    """A quantity of a formula is no number.
+    """A quantity of a formula is not a number.
 
     Attributes:
         step: the first timestep at which it is none.
@@ -85,7 +83,7 @@ class NoNumber(ArithmeticError):
 
 
 class View(NamedTuple):
-    """A trace as it is looked at.
+    """A trace, open or closed.
 
     Attributes:
         trace: the values of every signal named, all of the same length n.
@@ -130,19 +128,8 @@ def _bounds(formula: TruthNode, view: View) -> Bounds:
             return _temporal(formula, view)
 
 
-def steps_of(within: Interval, dt: float) -> tuple[int, int | None]:
-    """The first and the last timestep within an interval, None for no last one.
-
-    The first behind the last: the interval falls between two timesteps.
-    """
-    begin = math.ceil(within.begin / dt - STEP_TOLERANCE)
-    if math.isinf(within.end):
-        return begin, None
-    return begin, math.floor(within.end / dt + STEP_TOLERANCE)
-
-
 def _known(values: Values) -> Bounds:
-    """What does not depend on what follows."""
+    """Bounds of a value that does not depend on the continuation."""
     return Bounds(values, values)
 
 
@@ -169,7 +156,7 @@ def _compared(node: Comparison, view: View) -> Values:
     margin = b - a if node.op in ("<", "<=") else a - b
     if node.op in ("==", "!="):
         margin = np.abs(margin) if node.op == "!=" else -np.abs(margin)
-    close = ~(np.abs(margin) >= TINY)  # that is 0, or no number: both infinite and equal
+    close = ~(np.abs(margin) >= TINY)  # that is 0 or NaN: both infinite and equal
     if close.any():
         on_bound = TINY if node.op in (">=", "<=", "==") else -TINY
         margin[close] = np.where(a == b, on_bound, np.copysign(TINY, margin))[close]
@@ -229,7 +216,7 @@ def _temporal(node: Temporal, view: View) -> Bounds:
 
 
 def _eventually(of: Bounds, begin: int, end: int | None, view: View) -> Bounds:
-    """In a window ahead: what lies behind the last timestep may be anything."""
+    """In a window ahead; the values after the last timestep are unknown."""
     least, greatest = (largest_ahead(x, begin, end) for x in of)
     if end is not None:
         greatest[max(0, view.n - end) :] = math.inf
@@ -241,7 +228,7 @@ def _eventually(of: Bounds, begin: int, end: int | None, view: View) -> Bounds:
 def _until(node: Until, view: View) -> Bounds:
     """f until[a,b] g is eventually[a,b] g and (f until[a,inf) g) (Donze, Ferrere and Maler 2013).
 
-    The greatest robustness takes what follows the last timestep as true, the least as false.
+    The greatest robustness takes the continuation as true, the least as false.
     """
     f, g = _bounds(node.left, view), _bounds(node.right, view)
     begin, end = steps_of(node.within, view.dt)
@@ -258,7 +245,7 @@ def _until(node: Until, view: View) -> Bounds:
 
 
 def _until_one(f: Values, g: Values, begin: int, end: int | None, beyond: float) -> Values:
-    """The robustness of until when that of both is ``beyond`` behind the last timestep."""
+    """The robustness of until when that of both is ``beyond`` after the last timestep."""
     n = len(f)
     found = np.empty(n)
     last = beyond

@@ -1,6 +1,6 @@
-"""The signals that a formula may name: numbers that say how the ego fares at a timestep.
+"""The signals that a formula may name: numbers that describe the ego's state at a timestep.
 
-Only those that a formula names are computed. Where there is nobody to meet, distances and times are
+Only those that a formula names are computed. If there is no body to meet, distances and times are
 infinite and decelerations 0.
 """
 
@@ -9,19 +9,21 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from cavsumo.model.carriageway import Light
 from cavsumo.model.geometry import gap, overlap
-from cavsumo.model.scene import Scene
 from cavsumo.model.snapshot import BodyState, RawState, Snapshot
 
-SHOWN = {"G": 1.0, "g": 1.0, "r": -1.0}  # by SUMO's letter; anything else is 0
+if TYPE_CHECKING:
+    from cavsumo.model.carriageway import Light
+    from cavsumo.model.scene import Scene
+
+SHOWN = {"G": 1.0, "g": 1.0, "r": -1.0}  # by SUMO's letter; other letters are 0
 
 
 @dataclass(frozen=True)
 class Moment:
-    """A timestep as the signals see it.
+    """The data of a timestep from which signals are computed.
 
     Attributes:
         scene: of the episode.
@@ -36,13 +38,13 @@ class Moment:
 
 @dataclass(frozen=True)
 class SignalKind:
-    """What a signal is.
+    """The definition of a signal.
 
     Attributes:
         unit: of its values; empty for a number without one.
         meaning: one line.
         value: computes it.
-        sees_background: whether it looks at background traffic or lights.
+        sees_background: whether it uses background traffic or lights.
     """
 
     unit: str
@@ -162,7 +164,7 @@ SIGNALS: Mapping[str, SignalKind] = {
 }
 
 
-# What they are computed from
+# Parts of the computations
 
 
 def _everybody(now: Snapshot) -> Iterator[BodyState]:
@@ -202,9 +204,10 @@ def _hardest_braking(ego: BodyState, bodies: Iterable[BodyState]) -> float:
 
 
 def _of_boxes(metric: str, ego: BodyState, bodies: Iterable[BodyState]) -> Any:
-    """A metric of ``metrics.plane`` for the ego and each that it may meet; None for nobody.
+    """A metric of ``metrics.plane`` for the ego and each body that it may meet; None without
+    bodies.
 
-    Boxes whose circumscribed circles never meet are not looked at closely.
+    Boxes whose circumscribed circles never meet are left out.
     """
     meeting = [body for body in bodies if _circles_meet(ego, body)]
     if not meeting:

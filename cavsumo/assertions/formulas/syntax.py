@@ -1,6 +1,7 @@
-"""From the text of a formula to its tree, by recursive descent.
+"""Parsing the text of a formula into its tree, by recursive descent.
 
-From the loosest to the tightest, each left to right but for ``=>``, which groups to the right::
+From the weakest binding to the strongest, left-associative except ``=>``, which is
+right-associative::
 
     formula     = conditional { "<=>" conditional }
     conditional = either [ "=>" conditional ]
@@ -16,7 +17,7 @@ From the loosest to the tightest, each left to right but for ``=>``, which group
     function    = ("abs" | "min" | "max") "(" sum { "," sum } ")"
     interval    = "[" seconds "," (seconds | "inf") "]"
 
-Synonyms are in ``words``. What must be a number and what true or false is checked on the way.
+Synonyms are in ``words``. The types of nodes, number or truth value, are checked while parsing.
 """
 
 from __future__ import annotations
@@ -61,7 +62,7 @@ def parse(text: str, signals: Collection[str], where: str = "formula") -> TruthN
 
 
 class _FormulaParser:
-    """A formula half read."""
+    """A formula while it is parsed."""
 
     def __init__(self, text: Text, signals: Collection[str]) -> None:
         self._text, self._signals = text, signals
@@ -97,7 +98,7 @@ class _FormulaParser:
         self._text.refuse(self._word.at, f"expected {what}, got {self._word}")
 
     def _deeper(self, read: Callable[[], T]) -> T:
-        """Read what stands within something else."""
+        """Read a nested part."""
         self._depth += 1
         if self._depth > DEEPEST:
             self._text.refuse(self._word.at, f"more than {DEEPEST} levels within each other")
@@ -237,7 +238,7 @@ class _FormulaParser:
         return self._named(word)
 
     def _named(self, word: Word) -> Node:
-        """What a name stands for."""
+        """The node for a name."""
         if word.text in ("true", "false"):
             return Constant(word.text == "true", word.at)
         if word.text in FUNCTIONS and self._word.text == "(":

@@ -1,4 +1,4 @@
-"""The largest value in a window that slides over a sequence."""
+"""The largest value in a sliding window over a sequence."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ Values = NDArray[np.float64]
 def largest_ahead(x: Values, begin: int, end: int | None) -> Values:
     """The largest of x[i + begin] ... x[i + end] for each i; -inf where there are none.
 
-    Positions behind the last are left out; ``end`` None stands for all that follow. Takes
+    Positions after the last are left out; ``end`` None stands for all that follow. Takes
     O(n log(end - begin)): windows of twice the length are put together from two of the length.
     """
     n = len(x)

@@ -1,4 +1,4 @@
-"""The text of a formula as words, and how a mistake in it is pointed at."""
+"""The text of a formula as words, and error messages with positions in it."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from typing import NamedTuple, NoReturn
 
 from cavsumo.errors import InputError
 
-MOST = 500  # words; more is no formula that somebody wrote
+MOST = 500  # words; far more than a formula needs
 
 # Different ways to write the same.
 SYNONYMS = {
@@ -47,7 +47,7 @@ class Word(NamedTuple):
     """A word of a formula: number, name, sign or end."""
 
     sort: str
-    text: str  # as it is understood: synonyms are replaced
+    text: str  # with synonyms replaced
     written: str
     at: int
 
@@ -59,7 +59,7 @@ class Text(NamedTuple):
     """A formula as it was written.
 
     Attributes:
-        where: what it is, for messages.
+        where: name of the formula, for messages.
         text: it.
     """
 
@@ -67,7 +67,7 @@ class Text(NamedTuple):
     text: str
 
     def place(self, at: int) -> str:
-        """Where a letter stands, in words."""
+        """The position of a letter, in words."""
         line = self.text.count("\n", 0, at)
         column = at - (self.text.rfind("\n", 0, at) + 1) + 1
         lines = f"line {line + 1}, " if "\n" in self.text.strip() else ""
@@ -79,7 +79,7 @@ class Text(NamedTuple):
 
 
 def words(text: Text) -> list[Word]:
-    """The words of a formula and its end; raises InputError for what is none."""
+    """The words of a formula and its end; raises InputError for invalid letters."""
     found: list[Word] = []
     at, end = 0, len(text.text)
     while True:
@@ -100,7 +100,7 @@ def words(text: Text) -> list[Word]:
 
 
 def _odd(text: str, at: int) -> str:
-    """What is wrong with letters that are no word."""
+    """The message about letters that are not a word."""
     if text[at] == "=":
         return "got '=', equality is written '=='"
     run = re.match(r"[\w.]+", text[at:])

@@ -1,6 +1,7 @@
 """Criticality metrics: safe distances of rules, time to collision, decelerations, encroachment.
 
-Plain functions of numbers or arrays; they know nothing of episodes.
+Plain functions of numbers or arrays, independent of episodes. A metric for a column of the results
+is measured in an episode and has an entry in ``results.columns``.
 """
 
 from cavsumo.assertions.metrics.encroachment import pet, pet_tracks

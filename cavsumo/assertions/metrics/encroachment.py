@@ -1,14 +1,15 @@
-"""Post-encroachment time: how long after one body left the area that both sweep the other came.
+"""Post-encroachment time: from one body's leaving an area that both sweep to the other's entering
+it.
 
 A body is in that area while its box touches what the other's box sweeps. Tracks are taken for
-piecewise straight: between two moments a box moves straight on, so that of straight motion the
-times are exact, whatever the timestep. Where a box turns, the pieces are so short that its corners
-stay within ``SLACK_M`` of their place.
+piecewise straight: between two moments a box moves straight on, so that the times of straight
+motion are exact for any timestep. Where a box turns, the pieces are so short that its corners stay
+within ``SLACK_M`` of their place.
 
-What both sweep may be several areas, or one without an end where one follows the other. So an area
-is what pieces that touch one after another sweep, as far as the ways cross there by at least
-``CROSSING_RAD``. Ways that lead along each other have no area that one leaves before the other
-comes; there it is the shortest time between the one's being at a place and the other's coming.
+Two bodies may sweep several common areas, or an endless one if one follows the other. So an area
+consists of consecutive pieces that touch, where the courses cross by at least ``CROSSING_RAD``.
+Nearly parallel courses have no area that one body leaves before the other enters; there it is the
+shortest time between the one's being at a place and the other's coming.
 """
 
 from __future__ import annotations
@@ -24,9 +25,9 @@ from cavsumo.assertions.metrics.plane import ttc_boxes
 
 Numbers = NDArray[np.float64]
 Places = NDArray[np.intp]
-CROSSING_RAD = math.radians(10.0)  # ways that meet at less lead along each other
+CROSSING_RAD = math.radians(10.0)  # courses that meet at less are nearly parallel
 SLACK_M = 0.05
-ROUNDING_M = 1e-6  # added where a bound must not leave out who just touches
+ROUNDING_M = 1e-6  # added to a bound that must not exclude bodies that just touch
 # Beginning and end of a piece, of the one body against both of the other.
 ENDS = np.array([[0.0], [0.0], [1.0], [1.0]]), np.array([[0.0], [1.0], [0.0], [1.0]])
 
@@ -126,7 +127,7 @@ def moves(times: ArrayLike, boxes: ArrayLike) -> Moves:
 
 
 class Spells(NamedTuple):
-    """When each of two bodies is in an area that both sweep [s]."""
+    """The times at which each of two bodies is in an area that both sweep [s]."""
 
     enters: float
     leaves: float
@@ -135,7 +136,7 @@ class Spells(NamedTuple):
 
 
 def spells(first: Moves, second: Moves, least: float = CROSSING_RAD) -> Spells | None:
-    """When two bodies are in the area that their pieces sweep together; None where there is none.
+    """The times of two bodies in the area that both their pieces sweep; None without such an area.
 
     Args:
         least: the angle by which the ways must cross [rad].
@@ -191,7 +192,8 @@ def pet_moves(first: Moves, second: Moves, i: Places, j: Places) -> float:
 
 
 def presence(a: Moves, b: Moves) -> tuple[Numbers, Numbers]:
-    """From when until when a box touches what another sweeps, as shares of its piece; pair by pair.
+    """Begin and end of a box's contact with another's swept area, as shares of its piece; pair by
+    pair.
 
     Separating axes of a rectangle that moves and a hexagon that stands: the directions of the sides
     of both, of which the sweep has one more. The first is larger than the second where they do not.
@@ -232,9 +234,9 @@ def _areas(i: Places, j: Places, mine: Numbers, theirs: Numbers) -> float:
 
 
 def _along(a: Moves, b: Moves) -> float:
-    """The least time between being in one place of those who do not cross [s].
+    """The least time between being in one place for courses that do not cross [s].
 
-    As of the ends of the pieces.
+    Measured at the ends of the pieces.
     """
     (times, boxes), (others, places) = (
         m.after(share) for m, share in zip((a, b), ENDS, strict=True)

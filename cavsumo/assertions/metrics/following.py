@@ -1,9 +1,9 @@
-"""One vehicle behind another on a line: time to collision and what it takes to avoid it.
+"""One vehicle behind another on a line: time to collision and deceleration to avoid it.
 
 All functions take numbers or arrays that broadcast and return arrays of the common shape. Gaps are
 from the follower's front to the leader's rear [m], speeds [m/s], accelerations [m/s2], times [s].
-Where a follower does not close in there is nothing to avoid: times are infinite, decelerations 0.
-What is too large for a float is infinite.
+If a follower does not close in, times are infinite and decelerations 0. Values too large for a
+float are infinite.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ def mttc(
     """Modified time to collision, at constant accelerations (Ozbay et al. 2008) [s].
 
     The smallest positive root of (a_follow - a_lead) t^2 / 2 + (v_follow - v_lead) t - gap = 0.
-    Speeds are not kept from becoming negative.
+    Speeds may become negative.
     """
     distance, closing = _closing(gap, v_follow, v_lead)
     change = np.asarray(a_follow, float) - np.asarray(a_lead, float)

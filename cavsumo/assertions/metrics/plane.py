@@ -41,8 +41,8 @@ def ttc_2d_discs(
 def ttc_boxes(first: ArrayLike, v1: ArrayLike, second: ArrayLike, v2: ArrayLike) -> Numbers:
     """Time until two boxes touch, infinite if they never do, 0 if they overlap [s].
 
-    Separating axes: the shadows of two boxes on one of the directions of their sides overlap during
-    an interval of time; the boxes do where all four intervals meet.
+    Separating axes: the projections of two boxes on one of the directions of their sides overlap
+    during an interval of time; the boxes overlap in the intersection of all four intervals.
     """
     enter, leave = _overlap(first, v1, second, v2)
     begin = np.maximum(0.0, np.max(enter, axis=-1))
@@ -52,16 +52,16 @@ def ttc_boxes(first: ArrayLike, v1: ArrayLike, second: ArrayLike, v2: ArrayLike)
 def drac_boxes(first: ArrayLike, v1: ArrayLike, second: ArrayLike, v2: ArrayLike) -> Numbers:
     """Deceleration by which the first box just avoids the second: dv / (2 TTC) [m/s2].
 
-    dv is the closing speed along the first one's heading. Of a vehicle straight behind another this
-    is (v_follow - v_lead)^2 / (2 gap), of one whose way is crossed it is v^2 / (2 s), which brings
-    it to stand at the place s ahead where they would touch. 0 where they do not close in, infinite
-    where they touch.
+    dv is the closing speed along the first one's heading. For a vehicle straight behind another
+    this is (v_follow - v_lead)^2 / (2 gap); for a crossing course it is v^2 / (2 s), which stops
+    the vehicle at the distance s ahead where they would touch. 0 if they do not close in, infinite
+    if they touch.
     """
     return drac_at(first, v1, v2, ttc_boxes(first, v1, second, v2))
 
 
 def drac_at(first: ArrayLike, v1: ArrayLike, v2: ArrayLike, ttc: ArrayLike) -> Numbers:
-    """``drac_boxes`` where the time to collision is known [m/s2]."""
+    """``drac_boxes`` for a known time to collision [m/s2]."""
     heading, time = np.asarray(first, float)[..., 2], np.asarray(ttc, float)
     ahead = np.stack([np.cos(heading), np.sin(heading)], axis=-1)
     closing = _dot(np.asarray(v1, float) - np.asarray(v2, float), ahead)
@@ -74,7 +74,7 @@ def drac_at(first: ArrayLike, v1: ArrayLike, v2: ArrayLike, ttc: ArrayLike) -> N
 def closest_approach(
     p1: ArrayLike, v1: ArrayLike, p2: ArrayLike, v2: ArrayLike
 ) -> tuple[Numbers, Numbers]:
-    """When two points that keep their velocity are nearest from now on, and how near [s, m]."""
+    """Time and distance of the closest approach of two points that keep their velocity [s, m]."""
     apart = np.asarray(p2, float) - np.asarray(p1, float)
     moving = np.asarray(v2, float) - np.asarray(v1, float)
     speed2 = _dot(moving, moving)
@@ -87,7 +87,7 @@ def closest_approach(
 def _overlap(
     first: ArrayLike, v1: ArrayLike, second: ArrayLike, v2: ArrayLike
 ) -> tuple[Numbers, Numbers]:
-    """When the shadows on the four directions of their sides begin and cease to overlap [s]."""
+    """When the projections on the four directions of their sides begin and cease to overlap [s]."""
     a, b = np.broadcast_arrays(np.asarray(first, float), np.asarray(second, float))
     apart, moving = b[..., :2] - a[..., :2], np.asarray(v2, float) - np.asarray(v1, float)
     axes = np.concatenate([_sides(a[..., 2]), _sides(b[..., 2])], axis=-2)  # (..., 4, 2)
@@ -109,7 +109,7 @@ def _sides(heading: Numbers) -> Numbers:
 
 
 def _shadow(box: Numbers, axes: Numbers) -> Numbers:
-    """Half the length of a box's shadow on each axis."""
+    """Half the length of a box's projection on each axis."""
     sides = _sides(box[..., 2])
     along = np.abs(np.einsum("...ij,...kj->...ik", axes, sides))  # (..., axes, sides)
     return np.asarray(np.einsum("...ik,...k->...i", along, box[..., 3:5] / 2.0))

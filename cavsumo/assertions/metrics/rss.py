@@ -73,7 +73,7 @@ def _stopped(v: Numbers, rho: Numbers, accel: ArrayLike, decel: ArrayLike) -> Nu
 
 
 def _sideways(v: Numbers, rho: Numbers, accel: Numbers, decel: ArrayLike) -> Numbers:
-    """The way towards the other of one that accelerates towards it for rho, then brakes."""
+    """The way of a vehicle that accelerates towards the other for rho, then brakes."""
     after = v + rho * accel
     braking = np.where(after > 0.0, after**2 / (2.0 * np.asarray(decel, float)), 0.0)
     return (v + after) / 2.0 * rho + braking

@@ -24,7 +24,7 @@ def cavgym_zones(
     ped_width: float,
     ped_heading_ego_frame: float,
 ) -> dict[str, Any]:
-    """What CAV-Gym says of a pedestrian at one moment (github.com/TSL-UOB/CAV-Gym, bodies.py).
+    """CAV-Gym's verdict on a pedestrian at one moment (github.com/TSL-UOB/CAV-Gym, bodies.py).
 
     As there, an ego that stands or steers has no zones; the assertion ``reaction-zone`` bends them.
 
@@ -36,7 +36,7 @@ def cavgym_zones(
     Returns ``braking_m, reaction_m`` (the zones' lengths), ``braking_interval,
     reaction_interval`` (x in the ego's frame, None without zones) and ``verdict``: interesting (a
     pedestrian touches the reaction zone), uninteresting_terminated (the ego or its braking zone,
-    which is looked at first) or not_triggered.
+    which is checked first) or not_triggered.
     """
     braking, reaction = stopping_distances(
         ego_speed, max_decel=max_decel, reaction_time=reaction_time

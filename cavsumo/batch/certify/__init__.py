@@ -1,1 +1,1 @@
-"""A test over fresh seeds and a list of egos: what is certified, against whom, with what bounds."""
+"""A test on fresh seeds against a list of egos: the tested policy, the egos, the bounds."""

@@ -1,9 +1,9 @@
-"""How surely a test triggers, ego by ego: bounds that hold for all egos listed at once.
+"""Bounds on the probability that a test triggers, jointly valid for all listed egos.
 
 The tests among n episodes with fresh seeds are binomial, so Clopper and Pearson's lower bound
 holds with the confidence that is asked for. Of m egos each has its bound at level alpha / m
 (Bonferroni), so that all m hold at once with confidence 1 - alpha, and so does the least of them.
-Whatever is not known to have triggered counts as not triggered: unfair, invalid, an error.
+Unfair, invalid and error episodes count as not triggered.
 """
 
 from __future__ import annotations
@@ -21,20 +21,20 @@ from cavsumo.batch.tally import Found
 from cavsumo.results.reading import rows_of
 from cavsumo.results.statistics import lower_bound
 
-# Columns in which episodes that are the same differ all the same.
+# Columns in which even equal episodes differ.
 NAMES_ONLY = ("run", "seed", "trace", "wall_s")
 
 
 @dataclass(frozen=True)
 class Guarantee:
-    """What holds against one ego.
+    """The bounds against one ego.
 
     Attributes:
         label, ego, params: which.
-        found: what came out.
+        found: the counts of its episodes.
         triggered, violated: lower bounds on the probability that an episode is a test, and that the
             ego fails it.
-        alike: every episode came out the same.
+        alike: all episodes have equal results.
     """
 
     label: str
@@ -48,7 +48,7 @@ class Guarantee:
 
 @dataclass(frozen=True)
 class TriggerCertificate:
-    """What holds against all egos at once, each of the two bounds with the confidence.
+    """The bounds against all egos jointly, each of the two with the confidence.
 
     Attributes:
         guarantees: ego by ego.
@@ -86,7 +86,7 @@ def certified(
 
 
 def _alike(csv_file: Path) -> bool:
-    """Whether every episode came out the same."""
+    """Whether all episodes have equal results."""
     rows = ([v for k, v in row.items() if k not in NAMES_ONLY] for row in rows_of(csv_file))
     first = next(rows, None)
     return first is not None and all(row == first for row in rows)
@@ -119,7 +119,7 @@ def as_json(found: TriggerCertificate) -> dict[str, Any]:
 
 
 def as_table(found: TriggerCertificate) -> Table:
-    """One line an ego, and the least of all."""
+    """One line per ego, and the least of all."""
     table = Table(box=None, pad_edge=False, padding=(0, 2, 0, 0))
     table.add_column("ego", overflow="fold")
     for title in ("runs", "tests", "at least", "failures", "at least"):
@@ -143,18 +143,18 @@ def as_table(found: TriggerCertificate) -> Table:
 
 
 def described(label: str, ego: str, params: Mapping[str, Any]) -> str:
-    """An ego in words: its label, what it is, its parameters."""
+    """An ego in words: its label, its name, its parameters."""
     head = label if label == ego else f"{label}={ego}"
     return " ".join((head, *(f"{key}={value}" for key, value in params.items())))
 
 
 def sentences(found: TriggerCertificate) -> list[str]:
-    """What the certificate says, and what it does not."""
+    """The statement of the certificate, and its limits."""
     many = len(found.guarantees)
-    whom = "against this ego" if many == 1 else f"whichever of these {many} egos drives"
+    against = "against this ego" if many == 1 else f"against each of these {many} egos"
     said = [
         f"With {100 * found.confidence:g} % confidence an episode is a test with probability at "
-        f"least {rounded_down(found.triggered)}, {whom}; of others it says nothing."
+        f"least {rounded_down(found.triggered)}, {against}; it holds for no other ego."
     ]
     for one in found.guarantees:
         if one.alike and one.found.episodes > 1:
@@ -166,5 +166,5 @@ def sentences(found: TriggerCertificate) -> list[str]:
 
 
 def rounded_down(bound: float) -> str:
-    """A lower bound with four decimals that is one still."""
+    """A lower bound rounded down to four decimals."""
     return f"{math.floor(bound * 1e4) / 1e4:.4f}"

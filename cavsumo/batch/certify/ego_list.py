@@ -1,4 +1,4 @@
-"""The egos that a test is certified against: by label what each is, and its parameters."""
+"""The egos against which a test is certified: for each label an ego and its parameters."""
 
 from __future__ import annotations
 

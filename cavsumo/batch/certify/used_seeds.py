@@ -1,6 +1,6 @@
 """Seeds that were used, and a batch whose episodes have none of them.
 
-SUMO takes a seed modulo 2^31, so seeds that it takes for the same count as the same.
+SUMO uses a seed modulo 2^31, so seeds that are equal modulo 2^31 count as equal.
 """
 
 from __future__ import annotations
@@ -13,24 +13,24 @@ from typing import Any
 
 import numpy as np
 
-from cavsumo.batch.replay import recorded_plan
 from cavsumo.errors import InputError, ResultsError
 from cavsumo.model.scenario import BatchPlan
 from cavsumo.model.seeds import episode_seed
 from cavsumo.results.reading import FORMAT, rows_of
+from cavsumo.results.recorded_plan import recorded_plan
 
 SUMO_SEEDS = 2**31
-ATTEMPTS = 100  # batches that are tried; each fails only where two seeds agree by chance
+ATTEMPTS = 100  # batches that are tried; each fails only if two seeds agree by chance
 
 
 @dataclass(frozen=True)
 class Used:
-    """Seeds that a test has met, or may have.
+    """Seeds that a test has used, or may have used.
 
     Attributes:
-        seeds: of all episodes that are known.
-        results: the batches that they are of.
-        silent: files that an agent learned into and that do not say from which seeds.
+        seeds: of all known episodes.
+        results: their batches.
+        silent: files with an agent's knowledge that do not name the seeds.
     """
 
     seeds: frozenset[int]
@@ -39,7 +39,7 @@ class Used:
 
 
 def used(results: Sequence[Path], params: Mapping[str, Any]) -> Used:
-    """The seeds of results, of those that they came from, and of those that an agent learned from.
+    """The seeds of results, of their sources, and of the results from which an agent learned.
 
     ``params`` are the agent's: a manifest among them (``weights=results.json``) is followed, and
     so are those in the plans of all these results.
@@ -68,7 +68,7 @@ def used(results: Sequence[Path], params: Mapping[str, Any]) -> Used:
 def _seeds_of(csv_file: Path, plan: BatchPlan) -> set[int]:
     """The seeds of a batch: of its rows, and of all episodes of its plan, played here or not.
 
-    Where only the manifest is left, those of the plan.
+    If only the manifest exists, those of the plan.
     """
     seeds = {episode_seed(plan.seed, i) for i in range(plan.runs)}
     if plan.scenario.starts_seed is not None:
@@ -82,7 +82,7 @@ def _seeds_of(csv_file: Path, plan: BatchPlan) -> set[int]:
 
 
 def _files_in(params: Mapping[str, Any]) -> tuple[list[Path], list[Path]]:
-    """The JSON files among parameters: results by their manifests, and what is no manifest."""
+    """The JSON files among parameters: results by their manifests, and other files."""
     named = [Path(value) for value in params.values() if isinstance(value, str)]
     files = [file for file in named if file.suffix == ".json" and file.is_file()]
     known = [file for file in files if _is_manifest(file)]
@@ -114,5 +114,5 @@ def fresh_seed(seed: int, runs: int, used: Collection[int]) -> int:
 
 
 def _sumo_seeds(batch_seed: int, runs: int) -> Iterator[int]:
-    """The seeds of a batch's episodes as SUMO takes them."""
+    """The seeds of a batch's episodes modulo 2^31."""
     return (episode_seed(batch_seed, i) % SUMO_SEEDS for i in range(runs))

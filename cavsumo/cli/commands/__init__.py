@@ -1,1 +1,1 @@
-"""What each command does, one file a command; heavy to import, so only when it is called."""
+"""The commands, one file each; heavy to import, so imported only when they are called."""

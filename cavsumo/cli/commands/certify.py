@@ -1,4 +1,4 @@
-"""``cavsumo certify``: a test over fresh seeds and a list of egos, and what that proves."""
+"""``cavsumo certify``: a test on fresh seeds against a list of egos, with proven bounds."""
 
 from __future__ import annotations
 
@@ -8,13 +8,12 @@ import json
 import sys
 import tempfile
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from rich.console import Console
 
-from cavsumo.agents.policy import policy_file
+from cavsumo.agents.names import policy_file
 from cavsumo.batch.certify.certificate import (
     TriggerCertificate,
     as_json,
@@ -25,70 +24,30 @@ from cavsumo.batch.certify.certificate import (
 from cavsumo.batch.certify.ego_list import Egos, choices, opponents
 from cavsumo.batch.certify.tested_policy import Subject, of_policy, of_run, settings_of
 from cavsumo.batch.certify.used_seeds import Used, fresh_seed, used
-from cavsumo.batch.executors import Means
+from cavsumo.batch.manner import Manner, Means
 from cavsumo.batch.playing import played
-from cavsumo.batch.preflight import CheckedBatch, Manner, checked
+from cavsumo.batch.preflight import CheckedBatch, checked
 from cavsumo.batch.prepared import PreparedBatch
-from cavsumo.batch.replay import Record, prepared_again, recorded, recorded_plan
+from cavsumo.batch.replay import Record, prepared_again, recorded
 from cavsumo.batch.trust import check_trust
 from cavsumo.cli.commands.run import announce, exit_status
+from cavsumo.cli.requests.certify import CertifyOptions
 from cavsumo.egos import make_ego
 from cavsumo.errors import Exit, InputError
 from cavsumo.model.bodies import kind_named
 from cavsumo.model.labels import cast_of, labelled
-from cavsumo.model.scenario import BatchPlan, Params
+from cavsumo.model.scenario import BatchPlan
 from cavsumo.model.seeds import starts_generator
 from cavsumo.model.study import Part, product
+from cavsumo.network.recorded_starts import recorded_start
+from cavsumo.results.recorded_plan import recorded_plan
 
 FORMAT = 1  # of the JSON; raised when a key changes its meaning or goes
 WIDTH = 120
 
 
-@dataclass(frozen=True)
-class CertifyOptions:
-    """What to certify, against whom, and how to show it.
-
-    Attributes:
-        results, test: where the test comes from; a run's number or an agent.
-        starts: "kept" or "fresh"; None for what is usual.
-        open_loop: the run's recorded actions instead of its agent.
-        param: parameters of the agent in place of its own.
-        egos: as a command line names them.
-        ego_param: their parameters, ``LABEL.KEY``.
-        trust: use egos and assertions from outside that only the results name.
-        runs, seed: episodes an ego, and where their seeds come from.
-        apart: other results whose seeds are not to be used.
-        confidence: of the bounds for all egos together.
-        jobs: episodes at a time.
-        output: results file; None keeps none.
-        resume, overwrite, exit_zero, quiet: see ``Manner``.
-        as_json: as JSON instead of a table.
-    """
-
-    results: Path
-    test: str
-    starts: str | None = None
-    open_loop: bool = False
-    param: Params = dataclasses.field(default_factory=dict)
-    egos: Sequence[str] = ()
-    ego_param: Params = dataclasses.field(default_factory=dict)
-    trust: bool = False
-    runs: int = 100
-    seed: int = 1
-    apart: Sequence[Path] = ()
-    confidence: float = 0.95
-    jobs: int | None = None
-    output: Path | None = None
-    resume: bool = False
-    overwrite: bool = False
-    exit_zero: bool = False
-    quiet: bool = False
-    as_json: bool = False
-
-
 def certify(order: CertifyOptions) -> int:
-    """Play the test and say what holds; everything is checked before anything is written."""
-    _check(order)
+    """Play the test and print the bounds; all checks precede the first written file."""
     means = Means(order.jobs)
     plan, manifest = recorded_plan(order.results)
     egos = opponents(order.egos, order.ego_param, plan.scenario)
@@ -121,32 +80,18 @@ def certify(order: CertifyOptions) -> int:
 # Checked
 
 
-def _check(order: CertifyOptions) -> None:
-    """Refuse what can be seen to be wrong at once."""
-    if not 0.0 < order.confidence < 1.0:
-        raise InputError(f"--confidence: expected a share below 1, got {order.confidence:g}")
-    if order.runs < 1:
-        raise InputError(f"--runs: expected at least 1, got {order.runs}")
-    if not 0 <= order.seed < 2**63:
-        raise InputError(f"--seed: expected a number from 0 to 2^63 - 1, got {order.seed}")
-    if order.resume and order.output is None:
-        raise InputError("--resume: which results? name them with -o FILE")
-    if order.open_loop and order.starts == "fresh":
-        raise InputError("--open-loop: recorded actions need the starts that they were chosen for")
-    if not order.test.isdecimal() and (order.open_loop or order.starts == "kept"):
-        what = "--open-loop" if order.open_loop else "--starts kept"
-        raise InputError(f"{what}: {order.test!r} is no run, of which actions and starts are known")
-
-
 def _check_batches(
     order: CertifyOptions, batches: Sequence[CheckedBatch], subject: Subject, record: Record | None
 ) -> None:
-    """Refuse to write over what is read, and starts that another ego would change."""
+    """Refuse to overwrite the results that are read, and starts that another ego would change."""
     read = {file.resolve() for file in (order.results, *order.apart)}
     for batch in batches:
         if batch.output.resolve() in read:
             raise InputError(f"output {str(batch.output)!r}: is one of the results")
-    if record is None or subject.starts_seed is None:
+    for batch in batches if subject.told else ():
+        for start in subject.told:
+            recorded_start(batch.prepared.site, start)
+    if record is None or subject.starts_seed is None or subject.told:
         return
     seed, ours = subject.starts_seed, subject.starts
     if ours is None:
@@ -160,7 +105,7 @@ def _check_batches(
 
 
 def _drawn(prepared: PreparedBatch, seed: int) -> list[tuple[float, float, float]]:
-    """Where testers start in a prepared batch."""
+    """The starts of testers in a prepared batch."""
     scenario = prepared.plan.scenario
     ego = make_ego(scenario.ego, scenario.ego_params).kind
     kinds = [kind_named(scenario.kind)] * scenario.testers
@@ -168,18 +113,18 @@ def _drawn(prepared: PreparedBatch, seed: int) -> list[tuple[float, float, float
     return [(start.x, start.y, start.o) for start in starts]
 
 
-# What is played
+# The batches
 
 
 def _allowed(order: CertifyOptions) -> frozenset[str] | None:
-    """The egos that the user named, None for whatever the results name."""
+    """The egos that the user named; None to allow those of the results."""
     return None if order.trust else frozenset(cast_of(order.egos).values())
 
 
 def _subject(
     order: CertifyOptions, plan: BatchPlan, manifest: Mapping[str, Any]
 ) -> tuple[Subject, Record | None]:
-    """The test, and the run that it comes from if it does."""
+    """The test, and its run if it has one."""
     if not order.test.isdecimal():
         return of_policy(order.test, plan, manifest, order.results, order.param), None
     record = recorded(order.results, int(order.test), _allowed(order))
@@ -205,7 +150,7 @@ def _marked(batch: CheckedBatch, order: CertifyOptions, subject: Subject) -> Che
 
 @contextlib.contextmanager
 def _output(order: CertifyOptions) -> Iterator[Path]:
-    """Where the results go; without a name for them to where they are soon gone."""
+    """The results file; in a temporary folder without ``-o``."""
     if order.output is not None:
         yield order.output
         return
@@ -223,7 +168,7 @@ def _warn(
     seeds: Used,
     subject: Subject,
 ) -> None:
-    """Say on stderr what a reader of the certificate should know."""
+    """Print warnings about the certificate on stderr."""
     for part, now in (("versions", prepared.versions), ("sha256", prepared.checksums)):
         was = manifest.get(part) or {}
         for name in sorted(was.keys() & now.keys()):
@@ -240,7 +185,7 @@ def _warn(
 
 
 def _first_lines(order: CertifyOptions, subject: Subject, seeds: Used, seed: int) -> str:
-    """What is certified, what is kept and what is drawn."""
+    """The first lines: the test, and the kept and drawn parts."""
     starts = "kept" if subject.starts_seed is not None else "drawn anew"
     files = ", ".join(map(str, seeds.results))
     return (

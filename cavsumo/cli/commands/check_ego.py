@@ -1,4 +1,4 @@
-"""``cavsumo check-ego``: whether an ego does what every ego must, before it costs a batch."""
+"""``cavsumo check-ego``: whether an ego meets the requirements on every ego, before a batch."""
 
 from __future__ import annotations
 
@@ -20,15 +20,15 @@ from cavsumo.testing.ego_checks import CHECKS, Check
 from cavsumo.testing.scripts import ground
 
 EPISODES = 2
-SUMO_S = 60.0  # what the episodes in SUMO may take in any case
+SUMO_S = 60.0  # least time limit of the episodes in SUMO
 
 
 def check_ego(settings: Mapping[str, Any], deadline: float) -> int:
-    """Play every check to an ego, then two episodes in SUMO; say what passes and what does not.
+    """Play every check to an ego, then two episodes in SUMO; print the result of each.
 
     Args:
         settings: of a scenario, with ``net`` and ``ego``.
-        deadline: how long a check without SUMO may take [s].
+        deadline: time limit of a check without SUMO [s].
     """
     scenario = plan_from(settings, "check-ego").scenario
 
@@ -78,7 +78,7 @@ def _in_sumo(settings: Mapping[str, Any], deadline: float) -> str:
 
 @contextmanager
 def _limited(seconds: float) -> Iterator[None]:
-    """Interrupt what takes longer, a controller that never answers."""
+    """Interrupt a check that takes longer, for example a controller that never answers."""
 
     def late(number: int, frame: FrameType | None) -> None:
         raise EgoError(f"not done within {seconds:g} s")

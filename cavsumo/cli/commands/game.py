@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 import io
 import json
 import math
@@ -21,6 +20,7 @@ from rich.progress import Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
 from rich.table import Table
 from rich.text import Text
 
+from cavsumo.cli.requests.game import SolveOptions
 from cavsumo.errors import Exit, InputError
 from cavsumo.games.approach import Tell
 from cavsumo.games.files import read_game
@@ -33,42 +33,10 @@ from cavsumo.games.solve import NotCertified, Solution, Unsolvable, solve
 FORMAT = 1  # of the JSON; raised when a key changes its meaning or goes
 SHOWN = 60  # states in the table
 EVERY_S = 10.0  # between lines of progress where there is no terminal
-SUFFIXES = (".png", ".svg", ".pdf")
-
-
-@dataclasses.dataclass(frozen=True)
-class SolveOptions:
-    """What to solve, and how to show it.
-
-    Attributes:
-        file: the game.
-        reading: A, B or C.
-        precision: how far the bounds may be apart.
-        trim: solve what can be solved.
-        as_json: as JSON instead of a table.
-        picture: file to draw the game's tree into.
-        policy_picture: file to draw the policy into.
-        time_limit: seconds after which to give up, None: never.
-        quiet: no progress.
-    """
-
-    file: Path
-    reading: str
-    precision: float
-    trim: bool
-    as_json: bool
-    picture: Path | None
-    policy_picture: Path | None
-    time_limit: float | None
-    quiet: bool
 
 
 def solve_file(order: SolveOptions) -> int:
-    """Solve the game in a file and say what was found."""
-    if not (math.isfinite(order.precision) and order.precision > 0):
-        raise InputError(f"--precision: expected a positive number, got {order.precision:g}")
-    if order.time_limit is not None and not order.time_limit > 0:
-        raise InputError(f"--time-limit: expected positive seconds, got {order.time_limit:g}")
+    """Solve the game in a file and print the solution."""
     painters = _painters(order)
     try:
         with _progress(order.quiet) as tell, _stdout_kept():
@@ -97,7 +65,7 @@ def solve_file(order: SolveOptions) -> int:
 
 @contextmanager
 def _stdout_kept() -> Iterator[None]:
-    """Send to stderr what compiled libraries print: stdout has the result and nothing else."""
+    """Send the output of compiled libraries to stderr: stdout has only the result."""
     sys.stdout.flush()
     kept = os.dup(1)
     os.dup2(2, 1)
@@ -109,7 +77,7 @@ def _stdout_kept() -> Iterator[None]:
 
 
 def _status(order: SolveOptions, verdict: Solvability, solution: Solution | None) -> int:
-    """The exit status; says on stderr when the bounds are wider than asked for."""
+    """The exit status, with a note on stderr when the bounds are wider than the precision."""
     if solution is not None and not solution.precise:
         print(
             f"cavsumo: the bounds are {solution.width:.3g} apart, not {order.precision:g}: floats "
@@ -121,19 +89,13 @@ def _status(order: SolveOptions, verdict: Solvability, solution: Solution | None
 
 
 def _painters(order: SolveOptions) -> list[tuple[Any, Path]]:
-    """The functions that draw, with their files; InputError where that cannot be."""
+    """The functions that draw, with their files; InputError if that is impossible."""
     wanted = [("--picture", order.picture, "draw_tree")]
     wanted += [("--policy-picture", order.policy_picture, "draw_policy")]
     found = []
     for option, file, name in wanted:
         if file is None:
             continue
-        if file.suffix.lower() not in SUFFIXES:
-            raise InputError(
-                f"{option} {str(file)!r}: expected a name ending in .png, .svg or .pdf"
-            )
-        if not file.parent.is_dir():
-            raise InputError(f"{option} {str(file)!r}: no such folder {str(file.parent)!r}")
         try:
             from cavsumo.games import pictures
         except ImportError:
@@ -146,7 +108,7 @@ def _painters(order: SolveOptions) -> list[tuple[Any, Path]]:
 
 @contextmanager
 def _progress(quiet: bool) -> Iterator[Tell]:
-    """What is being done, on stderr: live on a terminal, now and then a line elsewhere."""
+    """The current step, on stderr: live on a terminal, a line at intervals elsewhere."""
     if quiet:
         yield lambda _, __: None
     elif sys.stderr.isatty():
@@ -161,7 +123,7 @@ def _progress(quiet: bool) -> Iterator[Tell]:
 
 @contextmanager
 def _lines() -> Iterator[Tell]:
-    """A line every EVERY_S with the seconds so far, also while one thing takes longer than that."""
+    """A line every EVERY_S with the seconds so far, also during a longer step."""
     begun, over, said = time.monotonic(), threading.Event(), "solving"
 
     def tell(doing: str, left: float) -> None:
@@ -182,7 +144,7 @@ def _lines() -> Iterator[Tell]:
 
 
 def _said(doing: str, left: float) -> str:
-    """What is being done, in words."""
+    """The current step, in words."""
     return f"solving: {doing}" + (f", residual {left:.1e}" if math.isfinite(left) else "")
 
 
@@ -214,7 +176,7 @@ def _json(order: SolveOptions, game: Game, verdict: Solvability, solution: Solut
 
 
 def _witness(verdict: Solvability) -> dict[str, Any] | None:
-    """The states that stand against a solution."""
+    """The states that make the game unsolvable."""
     if verdict.solvable:
         return None
     trap, cycle = verdict.trap, verdict.cycle
@@ -232,9 +194,9 @@ def _number(x: float) -> float | str:
 
 
 def _move(game: Game, solution: Solution, state: int) -> Any:
-    """What the tester plays in a state: an action, in B weights, in C a reply to each action.
+    """The tester's move in a state: an action, in B weights, in C a reply to each action.
 
-    None at goals and where no goal can be forced.
+    None at goals and in states from which no goal can be forced.
     """
     if game.goal[state] or not np.isfinite(solution.lower[state]):
         return None

@@ -9,10 +9,10 @@ import sys
 import tempfile
 from collections.abc import Iterator
 from contextlib import suppress
-from dataclasses import dataclass
 from pathlib import Path
 
 from cavsumo import __version__
+from cavsumo.cli.requests.import_osm import ImportOptions, log_file
 from cavsumo.errors import Exit, InputError
 from cavsumo.network.facts import Facts, facts
 from cavsumo.network.osm.extract import Box, find_roads, parse_box, write_roads
@@ -44,37 +44,10 @@ ZEBRA_OPTIONS = (
     "output.original-names",
     f"output-file={ZEBRA_NET}",
 )
-ENDINGS = (".net.xml", ".net.xml.gz")
-
-
-@dataclass(frozen=True)
-class ImportOptions:
-    """What to import, and how.
-
-    Attributes:
-        source: the extract.
-        output: the network to write.
-        bbox: west, south, east, north as written, or None for all of it.
-        left_hand: traffic keeps left; None for where the extract lies.
-        keep_pedestrian_signals: keep traffic lights that only stop cars for pedestrians.
-        zebra: pedestrians have priority on crossings without traffic lights.
-        overwrite: replace another network.
-        time_limit_s: how long netconvert may take [s].
-    """
-
-    source: Path
-    output: Path
-    bbox: str | None
-    left_hand: bool | None
-    keep_pedestrian_signals: bool
-    zebra: bool
-    overwrite: bool
-    time_limit_s: float
 
 
 def import_osm(order: ImportOptions) -> int:
-    """Make the network; nothing is written unless all went well."""
-    _check(order)
+    """Make the network; files are written only after success."""
     box = None if order.bbox is None else parse_box(order.bbox)
     roads = find_roads(order.source, box)
     found = side(roads.hints, box or roads.bounds or (0, 0, 0, 0))
@@ -91,7 +64,7 @@ def import_osm(order: ImportOptions) -> int:
         network = _with_notice((folder / NET).read_text(encoding="utf-8"), order, options)
         (folder / NET).write_text(network, encoding="utf-8", newline="\n")
         made = facts(read_network(folder / NET))
-    log = _log_file(order.output)
+    log = log_file(order.output)
     _publish(order, network, "".join(f"{line}\n" for line in said), log)
     remarks = [*about, *(f"note: {note}" for note in made.notes)]
     for line in [*remarks, *warning_summary(said, log)]:
@@ -101,7 +74,7 @@ def import_osm(order: ImportOptions) -> int:
 
 
 def _about_side(found: Side, asked: bool | None) -> Iterator[str]:
-    """What to say of the side of the road that was asked for or is taken."""
+    """The note about the side of the road, chosen or derived."""
     if asked is not None or not found.certain:
         about = warning(found, bool(asked))
         if about is not None:
@@ -115,21 +88,8 @@ def _about_side(found: Side, asked: bool | None) -> Iterator[str]:
         yield f"note: {found.words}: imported for left-hand traffic; --right-hand is the other side"
 
 
-def _check(order: ImportOptions) -> None:
-    """Refuse what cannot become a network file, before any work."""
-    output = order.output
-    if not output.name.endswith(ENDINGS) or output.name in ENDINGS:
-        raise InputError(f"output {str(output)!r}: expected a name that ends in .net.xml")
-    if not output.parent.is_dir():
-        raise InputError(f"output {str(output)!r}: no such folder {str(output.parent)!r}")
-    for file in (output, _log_file(output)):
-        if file.is_dir():
-            raise InputError(f"output {str(output)!r}: its place is taken by a folder")
-    sumo_home()
-
-
 def _options(order: ImportOptions, box: Box | None) -> list[str]:
-    """netconvert's options, apart from the type maps, whose place differs between machines."""
+    """netconvert's options without the type maps, whose path differs between machines."""
     left_out = {"tls.discard-simple"} if order.keep_pedestrian_signals else set()
     return [
         f"osm-files={EXTRACT}",
@@ -142,7 +102,7 @@ def _options(order: ImportOptions, box: Box | None) -> list[str]:
 
 
 def _zebra(folder: Path, time_limit_s: float) -> list[str]:
-    """Give the crossings without traffic lights priority; what netconvert says to it."""
+    """Give the crossings without traffic lights priority; returns netconvert's output."""
     network = read_network(folder / NET)
     crossings = [
         (
@@ -188,7 +148,7 @@ def _with_notice(network: str, order: ImportOptions, options: list[str]) -> str:
 
 
 def _publish(order: ImportOptions, network: str, log_text: str, log: Path) -> None:
-    """Put the network and its log in place, each as a whole."""
+    """Write the network and its log, each atomically."""
     data = network.encode("utf-8")
     if order.output.suffix == ".gz":
         data = gzip.compress(data, mtime=0)
@@ -205,7 +165,7 @@ def _publish(order: ImportOptions, network: str, log_text: str, log: Path) -> No
 
 
 def _write(file: Path, data: bytes) -> None:
-    """Replace a file as a whole: a reader sees the old one or the new one."""
+    """Replace a file atomically: a reader sees the old one or the new one."""
     part = file.with_name(f".{file.name}.part")
     try:
         part.write_bytes(data)
@@ -215,13 +175,8 @@ def _write(file: Path, data: bytes) -> None:
             part.unlink()
 
 
-def _log_file(output: Path) -> Path:
-    """The log beside a network."""
-    return output.with_name(output.name.removesuffix(".gz").removesuffix(".xml") + ".log")
-
-
 def _what_was_made(output: Path, made: Facts) -> str:
-    """One line about the network, and what to do with it."""
+    """One line about the network, and the next commands."""
     name = shlex.quote(str(output))
     side = ", left-hand traffic" if made.left_hand else ""
     lights = f"{made.traffic_lights} traffic light{'' if made.traffic_lights == 1 else 's'}"

@@ -1,4 +1,4 @@
-"""``cavsumo inspect``: what a network offers a test, as a table, as JSON, as a picture."""
+"""``cavsumo inspect``: a network described for tests, as a table, as JSON, as a picture."""
 
 from __future__ import annotations
 
@@ -15,10 +15,11 @@ from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
+from cavsumo.cli.requests.inspect import InspectOptions
 from cavsumo.cli.steps import SlowSteps
 from cavsumo.egos.base import EGO_KIND
 from cavsumo.errors import Exit, InputError, NetworkError
-from cavsumo.model.named_networks import check_network, network_file
+from cavsumo.model.named_networks import network_file
 from cavsumo.network.facts import Facts, facts
 from cavsumo.network.inspection import (
     InspectedNetwork,
@@ -35,29 +36,8 @@ FORMAT = 1  # of the JSON; raised when a key changes its meaning or goes
 WIDTH = 120
 
 
-@dataclasses.dataclass(frozen=True)
-class InspectOptions:
-    """What to look at, and how to show it.
-
-    Attributes:
-        net: the network.
-        junction: id of the only junction to show, None for the best.
-        top: how many junctions to show.
-        as_json: as JSON instead of a table.
-        picture: file to draw the first junction into.
-    """
-
-    net: Path
-    junction: str | None
-    top: int
-    as_json: bool
-    picture: Path | None
-
-
 def inspect(look: InspectOptions) -> int:
-    """Look at a network and say what is there."""
-    if look.top < 1:
-        raise InputError(f"--top: expected at least 1, got {look.top}")
+    """Describe a network."""
     draw = _drawing(look.picture)
     with SlowSteps(quiet=draw is None) as steps:
         found, here, junctions = _seen(look, steps)
@@ -73,9 +53,8 @@ def inspect(look: InspectOptions) -> int:
 
 
 def _seen(look: InspectOptions, steps: SlowSteps) -> tuple[Facts, InspectedNetwork, list[Junction]]:
-    """What there is to see of a network."""
+    """The facts and junctions of a network."""
     steps.begin(f"reading {look.net}")
-    check_network(look.net)
     network = read_network(network_file(look.net))
     try:
         found = facts(network)
@@ -87,7 +66,7 @@ def _seen(look: InspectOptions, steps: SlowSteps) -> tuple[Facts, InspectedNetwo
 
 
 def _note_unwritten(names: Sequence[str]) -> None:
-    """Say which names of streets are not in the picture."""
+    """Print the names of streets that are missing in the picture."""
     if names:
         said = _printable(", ".join(names))
         print(
@@ -98,22 +77,16 @@ def _note_unwritten(names: Sequence[str]) -> None:
 
 
 def _junctions(here: InspectedNetwork, look: InspectOptions) -> list[Junction]:
-    """The junction asked for, or the best."""
+    """The chosen junction, or the best ones."""
     if look.junction is not None:
         return [junction(here, here.network.junction(look.junction))]
     return best_junctions(here, look.top)
 
 
 def _drawing(picture: Path | None) -> Any:
-    """The function that draws, when a picture is wanted and possible; else InputError."""
+    """The function that draws, if a picture is requested; InputError if it is impossible."""
     if picture is None:
         return None
-    if picture.suffix.lower() not in (".png", ".svg", ".pdf"):
-        raise InputError(
-            f"--picture {str(picture)!r}: expected a name ending in .png, .svg or .pdf"
-        )
-    if not picture.parent.is_dir():
-        raise InputError(f"--picture {str(picture)!r}: no such folder {str(picture.parent)!r}")
     try:
         from cavsumo.network.drawing.picture import draw
     except ImportError:
@@ -181,7 +154,7 @@ def _utf8() -> bool:
 
 
 def _print(text: str) -> None:
-    """Print on stdout, whatever letters it can write."""
+    """Print on stdout, with the letters that it can write."""
     print(_printable(text), end="")
 
 

@@ -11,7 +11,7 @@ from cavsumo.errors import Exit
 
 
 def merge(parts: Sequence[Path], output: Path, overwrite: bool, quiet: bool) -> int:
-    """Merge the parts and say what they hold."""
+    """Merge the parts and print their summary."""
     whole = merged(parts, output, overwrite=overwrite)
     if not quiet:
         summarise([whole])

@@ -1,4 +1,4 @@
-"""``cavsumo run``: one batch or several, from the start or from where they are."""
+"""``cavsumo run``: one batch or several, new or continued."""
 
 from __future__ import annotations
 
@@ -20,11 +20,11 @@ from cavsumo.model.study import Part
 
 
 def run(settings: Mapping[str, Any], output: Path, means: Means, manner: Manner) -> int:
-    """Play a batch; everything is checked before anything is written."""
-    return run_study([Part("", dict(settings))], output, means, manner)
+    """Play a batch; all checks precede the first written file."""
+    return run_study(planned([Part("", dict(settings))], output, manner), means, manner)
 
 
-def run_study(parts: Sequence[Part], output: Path, means: Means, manner: Manner) -> int:
+def run_study(batches: Sequence[PlannedBatch], means: Means, manner: Manner) -> int:
     """Play one batch after another; all are checked before anything is written."""
     ended, interrupted = played(checked(parts, output, manner), means, manner, announce)
     status = exit_status(ended, interrupted, manner.exit_zero)
@@ -57,12 +57,20 @@ def _reason(ended: Sequence[Ended]) -> str:
 
 
 def announce(batch: CheckedBatch, jobs: int) -> None:
-    """Say on stderr what was chosen."""
+    """Print the chosen scenario on stderr."""
     print(_first_line(batch, jobs), file=sys.stderr)
 
 
+def _replacement(batch: CheckedBatch) -> str:
+    """A line about the results that a batch replaces."""
+    return (
+        f"cavsumo: {str(batch.output)!r}: another batch of {batch.replaced} episodes is replaced; "
+        "-o FILE keeps the next one"
+    )
+
+
 def _first_line(batch: CheckedBatch, jobs: int) -> str:
-    """What was chosen, for the user to see."""
+    """The chosen scenario in a line."""
     prepared = batch.prepared
     plan, scenario, route = prepared.plan, prepared.plan.scenario, prepared.site.route
     ego = make_ego(scenario.ego, scenario.ego_params)

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import argparse
-import dataclasses
 from pathlib import Path
 from typing import Any
+
+from cavsumo.cli.options.values import values_of
 
 
 def add_certify(commands: Any) -> None:
@@ -61,7 +62,7 @@ def _add_test(group: Any) -> None:
     add(
         "--open-loop",
         action="store_true",
-        help="of a run: its recorded actions, whatever happens, instead of its agent",
+        help="of a run: its recorded actions, in any situation, instead of its agent",
     )
     add(
         "--param",
@@ -116,18 +117,22 @@ def _add_output(group: Any) -> None:
         help="results file; FILE.csv becomes FILE-EGO.csv for each ego (default: none is kept)",
     )
     add("--resume", action="store_true", help="go on where the results end, or start")
-    add("--overwrite", action="store_true", help="start again in place of an unfinished batch")
+    add("--overwrite", action="store_true", help="start again in place of what is there")
     add("--json", dest="as_json", action="store_true", help="print JSON (docs/guide.md)")
     add("--exit-zero", action="store_true", help="a violation is no failure")
     add("-q", "--quiet", action="store_true", help="no progress")
 
 
 def _certify(options: argparse.Namespace) -> int:
-    from cavsumo.cli.commands.certify import CertifyOptions, certify
+    from cavsumo.cli.requests.certify import CertifyOptions, check_certify
     from cavsumo.cli.setting_options import assignment
 
-    given = {f.name: getattr(options, f.name) for f in dataclasses.fields(CertifyOptions)}
+    given = values_of(options, CertifyOptions)
     given["egos"] = tuple(word for words in options.egos or () for word in words)
     given["param"] = dict(assignment("--param", word) for word in options.param)
     given["ego_param"] = dict(assignment("--ego-param", word) for word in options.ego_param)
-    return certify(CertifyOptions(**given))
+    order = CertifyOptions(**given)
+    check_certify(order)
+    from cavsumo.cli.commands.certify import certify
+
+    return certify(order)

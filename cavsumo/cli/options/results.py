@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import argparse
-import dataclasses
 from pathlib import Path
 from typing import Any
+
+from cavsumo.cli.options.values import values_of
 
 
 def add_replay(commands: Any) -> None:
@@ -29,6 +30,12 @@ def add_replay(commands: Any) -> None:
         "--recorded",
         action="store_true",
         help="show what was recorded, without running it again: with other versions, say",
+    )
+    add(
+        "--playback",
+        action="store_true",
+        help="play its recorded actions and traffic back instead of asking its agent: from its "
+        "trace and the network, without routes",
     )
     add(
         "--trust",
@@ -90,31 +97,36 @@ def add_merge(commands: Any) -> None:
     )
     merge.add_argument("parts", nargs="+", type=Path, metavar="PART", help="the CSV of a shard")
     merge.add_argument("-o", "--output", required=True, type=Path, metavar="FILE")
-    merge.add_argument("--overwrite", action="store_true", help="in place of an unfinished batch")
+    merge.add_argument("--overwrite", action="store_true", help="in place of what is there")
     merge.add_argument("-q", "--quiet", action="store_true", help="no summary")
     merge.set_defaults(command=_merge)
 
 
 def _replay(options: argparse.Namespace) -> int:
-    from cavsumo.cli.commands.replay import ReplayOptions, replay
+    from cavsumo.cli.requests.replay import ReplayOptions, check_replay
 
-    names = [field.name for field in dataclasses.fields(ReplayOptions)]
-    return replay(
-        options.results, ReplayOptions(**{name: getattr(options, name) for name in names})
-    )
+    wanted = ReplayOptions(**values_of(options, ReplayOptions))
+    check_replay(options.results, wanted)
+    from cavsumo.cli.commands.replay import replay
+
+    return replay(options.results, wanted)
 
 
 def _report(options: argparse.Namespace) -> int:
-    from cavsumo.cli.commands.report import report
-    from cavsumo.report.files import ReportOptions
+    from cavsumo.report.order import ReportOptions, check_report
 
-    names = [field.name for field in dataclasses.fields(ReportOptions)]
-    return report(
-        options.results, ReportOptions(**{name: getattr(options, name) for name in names})
-    )
+    wanted = ReportOptions(**values_of(options, ReportOptions))
+    check_report(options.results, wanted)
+    from cavsumo.cli.commands.report import report
+
+    return report(options.results, wanted)
 
 
 def _merge(options: argparse.Namespace) -> int:
+    from cavsumo.results.reading import read_manifest
+
+    for part in options.parts:
+        read_manifest(part)
     from cavsumo.cli.commands.merge import merge
 
     return merge(options.parts, options.output, options.overwrite, options.quiet)

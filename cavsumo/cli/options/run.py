@@ -3,10 +3,16 @@
 from __future__ import annotations
 
 import argparse
-import dataclasses
 from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
+
+from cavsumo.cli.options.values import values_of
+
+if TYPE_CHECKING:
+    from cavsumo.model.scenario.fields import Setting
+
+SCRATCH = "results.csv"  # where the results of a run without -o lie
 
 
 def add_run(commands: Any) -> None:
@@ -31,9 +37,17 @@ def _fill(run: argparse.ArgumentParser) -> None:
     for title in dict.fromkeys(setting.option.group for setting in offered):
         group = run.add_argument_group(title)
         for setting in (s for s in offered if s.option.group == title):
-            add_setting(group.add_argument, setting)
+            several = _of_several(setting) if setting.key == "net" else {}
+            add_setting(group.add_argument, setting, **several)
         if title in OTHERS:
             OTHERS[title](group.add_argument)
+
+
+def _of_several(setting: Setting) -> dict[str, Any]:
+    """Keywords of an option that is given once for each of several batches."""
+    from cavsumo.cli.setting_options import help_of
+
+    return {"action": "append", "help": f"{help_of(setting)}; repeat for a batch on each"}
 
 
 def _add_config(add: Callable[..., Any]) -> None:
@@ -52,7 +66,7 @@ def _add_means(add: Callable[..., Any]) -> None:
 
 
 def _add_output(add: Callable[..., Any]) -> None:
-    add("-o", "--output", default="results.csv", metavar="FILE", help="default results.csv")
+    add("-o", "--output", metavar="FILE", help=f"default {SCRATCH}, which the next run replaces")
     add("--resume", action="store_true", help="go on where the results end, or start")
     add("--retry-errors", action="store_true", help="play the episodes again that ended in errors")
     add("--overwrite", action="store_true", help="start again in place of an unfinished batch")
@@ -69,11 +83,14 @@ OTHERS: Mapping[str, Callable[[Callable[..., Any]], None]] = {
 
 
 def _run(options: argparse.Namespace) -> int:
-    from cavsumo.batch.executors import Means
-    from cavsumo.batch.preflight import Manner
-    from cavsumo.cli.commands.run import run_study
+    from cavsumo.batch.manner import Manner, Means
+    from cavsumo.batch.planned import planned
     from cavsumo.cli.scenario_settings import parts_of
 
-    manner = Manner(**{f.name: getattr(options, f.name) for f in dataclasses.fields(Manner)})
+    manner = Manner(**values_of(options, Manner), scratch=options.output is None)
     means = Means(options.jobs, options.executor, options.scheduler)
-    return run_study(parts_of(options), Path(options.output), means, manner)
+    batches = planned(parts_of(options), Path(options.output or SCRATCH), manner)
+    # What can be refused quickly has been; now comes what takes long to import.
+    from cavsumo.cli.commands.run import run_study
+
+    return run_study(batches, means, manner)

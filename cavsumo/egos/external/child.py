@@ -13,26 +13,25 @@ from cavsumo.egos.external.link import Link, Tail
 from cavsumo.errors import EgoError
 from cavsumo.model.offspring import kill_descendants
 from cavsumo.model.own_folders import OwnFolder
-from cavsumo.model.processes import ending, leash, outer_environment
+from cavsumo.model.processes import end_with_parent, ending, outer_environment
 
-GRACE_S = 1.0  # how long it may take to end by itself
-GLANCE_S = 0.01  # between two looks whether it has
+GRACE_S = 1.0  # time that it has to end by itself
+GLANCE_S = 0.01  # interval of checks whether it has
 
 
 class Child(Link):
-    """A command that runs in the group of this process, so that whoever kills that kills it too.
+    """A command that runs in the process group of this process and is killed with it.
 
-    It has three pipes, none of our other descriptors, Python's changes to signals undone, and the
-    environment of the command line with a temporary folder of its own, by which its daemons are
-    known.
+    It has three pipes, none of our other descriptors, the default signal handlers, and the
+    environment of the command line with its own temporary folder, which identifies its daemons.
     """
 
     def __init__(self, words: Sequence[str], tail: Tail) -> None:
-        put_on_leash = leash(os.getpid())
+        follow_parent = end_with_parent(os.getpid())
 
         def before_exec() -> None:
-            put_on_leash()
-            signal.signal(signal.SIGINT, signal.SIG_DFL)  # a process of ours ignores it
+            follow_parent()
+            signal.signal(signal.SIGINT, signal.SIG_DFL)  # a process of cavsumo ignores it
 
         self._folder = OwnFolder("ego")
         try:
@@ -64,7 +63,7 @@ class Child(Link):
             self._pipes[0].close()
             self._watch(GRACE_S)
         kill_descendants(process.pid)
-        process.kill()  # also when it is stopped; harmless when it has ended
+        process.kill()  # also if it is stopped; harmless if it has ended
         with contextlib.suppress(subprocess.TimeoutExpired):
             process.wait(10.0)
         self._folder.close()
@@ -80,7 +79,7 @@ class Child(Link):
         return ending(code) + (f" ({last})" if last else "")
 
     def _watch(self, seconds: float) -> int | None:
-        """Wait for its end, reading what it writes meanwhile; None if it does not end."""
+        """Wait for its end and read its output meanwhile; None if it does not end."""
         deadline = time.monotonic() + seconds
         while (code := self._process.poll()) is None and time.monotonic() < deadline:
             self.drain()

@@ -1,7 +1,7 @@
-"""Egos from outside: a program that is started (``exec:COMMAND``), or one that listens (``tcp:``).
+"""External egos: a program that is started (``exec:COMMAND``), or one that listens (``tcp:``).
 
-Each is one conversation by the rules of ``protocol``. Whatever goes wrong in it ends the episode
-as an EgoError with the time; the next episode begins a new conversation.
+Each has one conversation by the rules of ``protocol``. An error in it ends the episode as an
+EgoError with the time; the next episode begins a new conversation.
 """
 
 from __future__ import annotations
@@ -20,6 +20,7 @@ from cavsumo.egos.external.child import Child
 from cavsumo.egos.external.link import ExtraLineError, GoneError, Link, Tail
 from cavsumo.egos.external.protocol import shown
 from cavsumo.egos.external.wire import Wire, host_and_port
+from cavsumo.egos.names import EXTERNAL_NAMES
 from cavsumo.errors import EgoError, InputError
 from cavsumo.model.checks import number
 from cavsumo.model.registry import Registry
@@ -27,11 +28,11 @@ from cavsumo.model.scene import Scene
 from cavsumo.model.snapshot import Snapshot
 
 DAY_S = 86400.0
-EXTERNAL: Registry[ExternalEgo] = Registry("ego")
+EXTERNAL: Registry[ExternalEgo] = Registry(EXTERNAL_NAMES)
 
 
 class ExternalEgo(Ego, ABC):
-    """Base of both; the spec names it in messages."""
+    """Base of both; the spec is its name in messages."""
 
     PARAMETERS: ClassVar[Mapping[str, str]] = {
         "reply_s": "real time within which it must answer an observation [s]",
@@ -83,11 +84,11 @@ class ExternalEgo(Ego, ABC):
 
     @abstractmethod
     def _aim(self, address: str) -> None:
-        """Take up what stands behind the colon of the spec; raises InputError."""
+        """Take up the part of the spec after the colon; raises InputError."""
 
     @abstractmethod
     def _linked(self) -> Link:
-        """A new process or connection; raises EgoError when there is none to be had."""
+        """A new process or connection; raises EgoError if that fails."""
 
     def prepare(self, mission: Mission) -> None:
         self._hello = protocol.hello(mission, self.kind)
@@ -124,10 +125,10 @@ class ExternalEgo(Ego, ABC):
         return command
 
     def conclude(self) -> None:
-        """Make sure that each answer was that to its observation, if they did not say so.
+        """Make sure that each answer belonged to its observation, if the answers have no step.
 
-        A second answer that came late would have been taken for the next one. Asked to begin
-        again, the ego has said all that it had to say about this episode.
+        A late second answer would have been taken for the answer to the next observation. After one
+        more reset all lines about this episode have arrived.
         """
         if self._link is None or self._named:
             return
@@ -163,9 +164,9 @@ class ExternalEgo(Ego, ABC):
         return self._link
 
     def _begin(self) -> None:
-        """Begin an episode, in a new conversation if the old one is spoilt.
+        """Begin an episode, in a new conversation if the old one has unread lines.
 
-        Lines that lie in the old one before this episode begins are no fault of it.
+        Lines that precede this episode are not its error.
         """
         if self._ended is not None:
             error, self._ended = self._ended, None
@@ -180,7 +181,7 @@ class ExternalEgo(Ego, ABC):
         protocol.check_ready(self._open().ask(self._reset, self.start_s))
 
     def _left_over(self, link: Link) -> bytes:
-        """Ask the ego to begin an episode: the line that it wrote about the one before, if any."""
+        """Ask the ego to begin an episode; returns the line about the previous one, if any."""
         try:
             reply = link.ask(self._reset, self.start_s)
         except ExtraLineError as error:
@@ -193,7 +194,7 @@ class ExternalEgo(Ego, ABC):
         return b""
 
     def _given_up(self, when: str, error: EgoError) -> EgoError:
-        """The error of an episode, its conversation ended."""
+        """The error of an episode, whose conversation is ended."""
         self._drop()
         return EgoError(f"ego {self.spec} at {self._time:.2f} s{when}: {error}")
 
@@ -206,7 +207,7 @@ class ExternalEgo(Ego, ABC):
 
 @EXTERNAL.register("exec")
 class ExecEgo(ExternalEgo):
-    """A program that answers on its stdout what it reads on its stdin: --ego exec:COMMAND."""
+    """A program that answers on its stdout the lines of its stdin: --ego exec:COMMAND."""
 
     def _aim(self, address: str) -> None:
         self.words = command_words(address)
@@ -217,7 +218,7 @@ class ExecEgo(ExternalEgo):
 
 @EXTERNAL.register("tcp")
 class TcpEgo(ExternalEgo):
-    """A program that listens there and answers the same lines: --ego tcp:HOST:PORT."""
+    """A program that listens at a port and answers the same lines: --ego tcp:HOST:PORT."""
 
     def _aim(self, address: str) -> None:
         self.host, self.port = host_and_port(address)

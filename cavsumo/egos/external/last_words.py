@@ -1,7 +1,7 @@
-"""The line of a program's last output that says why it ended.
+"""The line of a program's last output that gives the reason of its end.
 
-Most programs say it in their last line. Some runtimes print more behind it: node its version and
-the stack, Java the stack, Go the goroutines, Rust a hint. Then the message stands above that.
+Most programs print it in their last line. Some runtimes print more after it: node its version and
+the stack, Java the stack, Go the goroutines, Rust a hint.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ from collections.abc import Sequence
 LONGEST = 200  # characters of a line that is quoted
 REACH = 20  # lines of a message above its last one
 
-# Last lines behind which a runtime has hidden its message.
+# Last lines of runtimes that print their message above.
 _END = re.compile(
     r"Node\.js v\d|[)\]}]+,?$"  # node: its version, an object that it shows
     r"|\s+at |\s+\.\.\. \d+ more$"  # stacks of node and Java
@@ -27,7 +27,7 @@ _HEAD = re.compile(r"Uncaught |Caused by: |Exception in thread |[\w.$]*(Error|Ex
 
 
 def telling_line(text: str) -> str:
-    """The line that says why a program ended, shortened; empty when nothing is said."""
+    """The line with the reason of a program's end, shortened; empty if there is none."""
     lines = [line for line in text.splitlines() if line.strip()]
     if not lines:
         return ""
@@ -38,12 +38,12 @@ def telling_line(text: str) -> str:
 
 
 def _is_behind(line: str) -> bool:
-    """Whether a line stands behind a message: stacks, and what else a runtime prints there."""
+    """Whether a line is one that runtimes print after a message, such as a stack."""
     return bool(_END.match(line) or _BEHIND.match(line))
 
 
 def _first_line(lines: Sequence[str], last: int) -> str:
-    """The line with which a message of several lines begins, from the place of its last one."""
+    """The first line of a message of several lines, from the index of its last one."""
     for line in reversed(lines[max(0, last - REACH) : last + 1]):
         if _is_behind(line):
             break

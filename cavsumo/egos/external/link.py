@@ -1,7 +1,7 @@
-"""Lines to an ego outside and back, each reply within a deadline, over file descriptors.
+"""Lines to an external ego and back, each reply within a deadline, over file descriptors.
 
-One thread, no buffer without a bound: while we wait for a reply we also read what the ego writes
-to its stderr, and while we write we read, so neither side can make the other wait for ever.
+There is one thread, and every buffer has a bound. The ego's stderr is read while waiting for a
+reply, and its output while writing, so neither side can block the other for ever.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from cavsumo.egos.external.protocol import shown
 from cavsumo.errors import EgoError
 
 LINE_LIMIT = 65536  # bytes of a reply, its end not counted
-LOG_LIMIT = 65536  # bytes kept of what it writes to its stderr
+LOG_LIMIT = 65536  # bytes kept of its stderr
 CHUNK = 65536
 
 
@@ -26,7 +26,7 @@ class ExtraLineError(EgoError):
     """The ego wrote more lines than it was asked for.
 
     Attributes:
-        line: the first line that came, which may be an answer; what there is of it.
+        line: the first line received, possibly an answer, possibly incomplete.
     """
 
     def __init__(self, message: str, line: bytes) -> None:
@@ -39,13 +39,13 @@ class GoneError(EgoError):
 
 
 class Tail:
-    """The last bytes of a stream, as many as LOG_LIMIT, and how many came before them."""
+    """The last LOG_LIMIT bytes of a stream, and the number of bytes before them."""
 
     def __init__(self) -> None:
         self._data, self._cut = bytearray(), 0
 
     def add(self, chunk: bytes) -> None:
-        """Append bytes, forgetting the first ones of too many."""
+        """Append bytes and drop the first ones beyond the limit."""
         self._data += chunk
         excess = len(self._data) - LOG_LIMIT
         if excess > 0:
@@ -53,27 +53,27 @@ class Tail:
             self._cut += excess
 
     def take(self) -> str:
-        """What is there, as text, a note before it if bytes were cut; then nothing is there."""
+        """Remove and return the content as text, after a note if bytes were cut."""
         text = self._data.decode("utf-8", errors="backslashreplace")
         note = f"[{self._cut} bytes before this are cut]\n" if self._cut else ""
         self._data, self._cut = bytearray(), 0
         return note + text
 
     def state(self) -> tuple[bytes, int]:
-        """What is there now, to come back to."""
+        """The present content, for ``back_to``."""
         return bytes(self._data), self._cut
 
     def back_to(self, state: tuple[bytes, int]) -> None:
-        """Forget what came since a state."""
+        """Drop the bytes received since a state."""
         self._data, self._cut = bytearray(state[0]), state[1]
 
     def telling_line(self) -> str:
-        """The line that says why its writer ended, shortened; empty for none."""
+        """The line with the reason of its writer's end, shortened; empty for none."""
         return telling_line(self._data.decode("utf-8", errors="replace"))
 
 
 class Link(ABC):
-    """One ego outside: asked line by line, ended once.
+    """The connection to one external ego: asked line by line, ended once.
 
     Args:
         sink, source: descriptors to write to and to read from; they are made non-blocking.
@@ -102,7 +102,7 @@ class Link(ABC):
         return self._receive(deadline, seconds)
 
     def drain(self) -> None:
-        """Read what it has written to its stderr."""
+        """Read its stderr."""
         if self.errors is not None:
             with contextlib.suppress(OSError):
                 while chunk := os.read(self.errors, CHUNK):
@@ -114,7 +114,7 @@ class Link(ABC):
 
     @abstractmethod
     def _gone(self) -> str:
-        """How it ended, now that it reads or writes no more."""
+        """The error for an ego that no longer reads or writes."""
 
     def _send(self, line: bytes, deadline: float, seconds: float) -> None:
         """Write a line, reading meanwhile."""
@@ -133,13 +133,13 @@ class Link(ABC):
             self._check_unasked()
 
     def _check_unasked(self) -> None:
-        """Raise ExtraLineError if something was written that nobody asked for."""
+        """Raise ExtraLineError if it has written a line without being asked."""
         if unasked := self._read():
             said = f"wrote {shown(unasked)} before it was asked"
             raise ExtraLineError(said, unasked.partition(b"\n")[0])
 
     def _receive(self, deadline: float, seconds: float) -> bytes:
-        """The line that comes."""
+        """The next line."""
         received = b""
         while True:
             in_time = self._wait(self._reading, deadline)
@@ -163,7 +163,7 @@ class Link(ABC):
         return left > 0.0
 
     def _read(self) -> bytes:
-        """What can be read now, up to a bound; raises EgoError at the end of the stream."""
+        """The bytes available now, up to a bound; raises EgoError at the end of the stream."""
         try:
             chunk = os.read(self.source, CHUNK)
         except BlockingIOError:
@@ -175,7 +175,7 @@ class Link(ABC):
         return chunk
 
     def _read_errors(self) -> None:
-        """Take up some of its stderr; at its end, listen no more."""
+        """Read some of its stderr; close it at its end."""
         assert self.errors is not None
         try:
             chunk = os.read(self.errors, CHUNK)

@@ -1,6 +1,6 @@
-"""What cavsumo and an ego outside say to each other: messages to JSON lines, and replies checked.
+"""The messages between cavsumo and an external ego as JSON lines, with checks of the replies.
 
-Pure text; how the lines travel is no matter here. ``docs/ego-protocol.md`` is the specification.
+Text only, independent of the transport of the lines. ``docs/ego-protocol.md`` is the specification.
 Floats are written as Python's repr, the shortest text that reads back as the same number.
 """
 
@@ -80,7 +80,7 @@ class Observations:
         self._known: dict[int, tuple[str, RawState, str]] = {}
 
     def line(self, snapshot: Snapshot) -> bytes:
-        """What is seen at one timestep."""
+        """The observation of one timestep."""
         _, x, y, v, o = snapshot.ego
         here = self._scene.ego_projection(snapshot)
         bodies = [self._body(raw) for raw in (*snapshot.testers, *snapshot.raw_background)]
@@ -156,7 +156,7 @@ def is_ready(line: bytes) -> bool:
 
 
 def is_left_over(line: bytes) -> bool:
-    """Whether this answers an observation, where a reset should have been answered."""
+    """Whether this answers an observation instead of a reset."""
     try:
         return not _COMMAND.isdisjoint(_object(line))
     except EgoError:
@@ -164,9 +164,10 @@ def is_left_over(line: bytes) -> bool:
 
 
 def answer(line: bytes, step: int) -> tuple[Acceleration | Drive, bool]:
-    """The command in the answer to the observation of a timestep, and whether it names that.
+    """The command in the answer to the observation of a timestep, and whether it names the
+    timestep.
 
-    Raises EgoError when it names another one; an answer need not say which it is.
+    Raises EgoError if it names another timestep.
     """
     reply = _object(line)
     if "step" not in reply:
@@ -195,7 +196,7 @@ def _command(line: bytes, reply: dict[str, Any]) -> Acceleration | Drive:
 
 
 def names(command: Acceleration | Drive) -> tuple[str, ...]:
-    """What the numbers of a command are called in the protocol."""
+    """The names of the numbers of a command in the protocol."""
     return ("acceleration",) if isinstance(command, Acceleration) else ("throttle", "steering")
 
 
@@ -208,7 +209,7 @@ def _typed(line: bytes, expected: str) -> dict[str, Any]:
 
 
 def _object(line: bytes) -> dict[str, Any]:
-    """A reply as an object; raises EgoError with what it says of itself if it is an error."""
+    """A reply as an object; raises EgoError with its text if it reports an error."""
     try:
         reply = json.loads(line.decode())
     except (ValueError, RecursionError):

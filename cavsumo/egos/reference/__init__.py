@@ -1,4 +1,5 @@
-"""Reference drivers: who could have avoided it? One file a driver, none of them knows SUMO.
+"""Reference drivers, by which violations are judged avoidable or not: one file per driver, without
+SUMO.
 
 To add one: a file here, its name in ``names``; it is imported when one is built.
 """

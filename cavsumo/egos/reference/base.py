@@ -1,4 +1,4 @@
-"""What a reference driver is: when it perceives a risk, and how it brakes from then on."""
+"""The protocol of reference drivers: when they perceive a risk, and how they brake from then on."""
 
 from __future__ import annotations
 
@@ -11,10 +11,10 @@ from cavsumo.model.registry import Registry
 
 
 class Reference:
-    """Base of the reference drivers; all keep to the ego's path and do nothing but brake.
+    """Base of the reference drivers; all follow the ego's path and only brake.
 
     Attributes:
-        words: what it is called in a sentence.
+        words: its name in a sentence.
     """
 
     words: str
@@ -23,17 +23,17 @@ class Reference:
         """The timestep of its risk perception point, None when there is nothing to perceive.
 
         Args:
-            encounters: how the ego and the body of the violation lie at each timestep up to it;
-                None where the body is not there.
+            encounters: positions of the ego and the body of the violation relative to each other at
+                each timestep up to it; None for timesteps without the body.
             dt: length of a timestep [s].
         """
         raise NotImplementedError
 
     def speed_lost(self, elapsed: float, kind: Kind) -> float:
-        """How much speed it has taken off since its risk perception point [m/s].
+        """The speed that it has lost since its risk perception point [m/s].
 
-        The integral of its braking over the time ``elapsed`` [s], as if it never came to stand;
-        never falling. No vehicle brakes harder than its kind can.
+        The integral of its braking over the time ``elapsed`` [s], without a limit at standstill;
+        never decreasing. No vehicle brakes harder than its kind can.
         """
         raise NotImplementedError
 

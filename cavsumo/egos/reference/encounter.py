@@ -1,7 +1,7 @@
-"""How a body lies and moves relative to the ego's way, at one timestep.
+"""Position and motion of a body relative to the ego's way, at one timestep.
 
-The ego is taken to keep to its path, whose *strip* is what its width sweeps. Everything is measured
-along the path and across it; a body counts with the extent of its turned box.
+The ego is assumed to follow its path; its *strip* is the area that its width sweeps. Everything is
+measured along the path and across it; a body counts with the extent of its turned box.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from cavsumo.model.scene import Scene
 from cavsumo.model.snapshot import BodyState, Snapshot
 
 SIGHT_M = 100.0  # how far ahead a driver looks
-EVALUATION_S = 0.4  # a conflict that is over sooner than this is none to a driver
+EVALUATION_S = 0.4  # a driver ignores a conflict that ends sooner
 
 
 class Encounter(NamedTuple):
@@ -47,8 +47,8 @@ class Encounter(NamedTuple):
     def conflict(self) -> bool:
         """Whether both touch if they keep their velocities, and a driver can see it coming.
 
-        The body is on the carriageway, not beside it, and no farther ahead than ``SIGHT_M``. To
-        an ego that stands whoever is in its strip is a conflict: it need not set off.
+        The body is on the carriageway, not beside it, and no farther ahead than ``SIGHT_M``. For a
+        standing ego every body in its strip is a conflict: it need not set off.
         """
         if not self.on_road or self.gap > SIGHT_M or self.gap <= -self.length:
             return False
@@ -60,7 +60,7 @@ class Encounter(NamedTuple):
 
     @property
     def in_way(self) -> bool:
-        """Whether the body is where the ego cannot pass, and the ego comes nearer, if only for now.
+        """Whether the body blocks the ego's way at present, and the ego comes nearer.
 
         That is in the strip, or on the carriageway with less than ``BESIDE_M`` between them.
         """
@@ -69,7 +69,7 @@ class Encounter(NamedTuple):
 
 
 def _spell(distance: float, length: float, speed: float) -> tuple[float, float]:
-    """From when until when two intervals overlap that close at a constant speed [s].
+    """Begin and end of the overlap of two intervals that close at a constant speed [s].
 
     ``distance`` is between them, negative once they overlap; ``length`` is that of both together.
     """
@@ -80,7 +80,7 @@ def _spell(distance: float, length: float, speed: float) -> tuple[float, float]:
 
 
 def encounter(scene: Scene, snapshot: Snapshot, body: BodyState) -> Encounter:
-    """How a body lies to the ego's way in a snapshot."""
+    """The encounter of the ego with a body in a snapshot."""
     ego, path = snapshot.ego, scene.ego_path
     here, front = path.project(body.x, body.y), path.project(ego.x, ego.y).along
     front += ego.body.kind.length / 2
@@ -103,12 +103,11 @@ def encounter(scene: Scene, snapshot: Snapshot, body: BodyState) -> Encounter:
 
 
 def lasting_conflict(encounters: Sequence[Encounter | None], dt: float) -> int | None:
-    """The timestep at which the risk began that is under way at the end; None for none.
+    """The timestep at which the risk began that lasts until the end; None without one.
 
-    A risk is a conflict, or a body in the way: whoever is there may stay there, so a driver does
-    not wait for a velocity that leads to a touch. It is one to a driver if it lasts for
-    ``EVALUATION_S``, or until the end. It is over once there has been none for as long: what was
-    settled before has nothing to do with the end.
+    A risk is a conflict, or a body in the way: the body may stay there, so a driver does not wait
+    for a velocity that leads to a touch. A driver perceives it if it lasts for ``EVALUATION_S``, or
+    until the end. It has ended when there has been none for that time.
     """
     alarm = began = ceased = None
     for step, met in enumerate(encounters):
@@ -124,5 +123,5 @@ def lasting_conflict(encounters: Sequence[Encounter | None], dt: float) -> int |
 
 
 def _lasts(since: int, step: int, dt: float) -> bool:
-    """Whether it has been so for as long as a driver takes to evaluate it."""
+    """Whether it has lasted for the time that a driver needs to evaluate it."""
     return (step - since) * dt >= EVALUATION_S - 1e-9

@@ -1,4 +1,4 @@
-"""The driver who does what Responsibility-Sensitive Safety asks for, and no more.
+"""The driver with the proper response of Responsibility-Sensitive Safety, and no more.
 
 Source: Shalev-Shwartz et al., arXiv 1708.06374, definitions 1, 2 and 6 (safe distances), 3 and 7
 (dangerous when neither the longitudinal nor the lateral distance is safe) and the proper response:
@@ -41,7 +41,7 @@ class RssDriver(Reference):
 
 
 def dangerous(met: Encounter) -> bool:
-    """Whether neither distance is safe. Who is behind the ego has to keep the distance itself."""
+    """Whether neither distance is safe. A body behind the ego must keep the distance itself."""
     if met.gap <= -met.length or met.gap > SIGHT_M:
         return False
     beside = rss_lateral(
@@ -51,7 +51,7 @@ def dangerous(met: Encounter) -> bool:
 
 
 def _safe_gap(met: Encounter) -> float:
-    """The safe longitudinal distance to somebody ahead, or to one who comes towards the ego [m]."""
+    """The safe longitudinal distance to a body ahead, or to an oncoming one [m]."""
     if met.onward >= 0.0:
         return float(
             rss_longitudinal(met.speed, met.onward, RESPONSE_S, ACCEL_MAX, BRAKE_MIN, BRAKE_MAX)

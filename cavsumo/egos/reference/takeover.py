@@ -1,4 +1,4 @@
-"""An ego whose driver is relieved in the middle of an episode: what if another had braked then?"""
+"""An ego that a reference driver takes over in the middle of an episode."""
 
 from __future__ import annotations
 
@@ -10,18 +10,18 @@ from cavsumo.model.snapshot import Snapshot
 
 
 class Takeover(Ego):
-    """Drives as the original ego until a timestep, then as a reference driver who perceives there.
+    """Drives as the original ego until a timestep, then as a reference driver that perceives there.
 
-    The reference keeps to the ego's path and brakes. Until its brake takes effect it leaves the
-    pedals as they are, but never gains speed: an ego that was braking goes on to. The original is
-    not asked again.
+    The reference follows the ego's path and brakes. Until its brake takes effect it keeps the
+    pedals as they are, but never gains speed: an ego that was braking continues to brake. The
+    original is not called again.
 
     Args:
         ego: the original; it is not closed.
-        reference: who takes over.
+        reference: the driver that takes over.
         step: the timestep from which on the reference decides.
-        drives: whether the original steers itself; the reference then does so too, by pure pursuit
-            of the path, else SUMO keeps to the route.
+        drives: whether the original steers itself; the reference then also steers, by pure pursuit
+            of the path, else SUMO steers.
     """
 
     def __init__(self, ego: Ego, reference: Reference, step: int, *, drives: bool) -> None:
@@ -37,7 +37,7 @@ class Takeover(Ego):
         self._dt = scene.dt
         self._course = Course(scene.ego_path, self.kind, scene.dt, self.kind.v_max)
         self._before: float | None = None  # speed at the timestep before
-        self._kept = 0.0  # acceleration that the pedals give as they are [m/s2]
+        self._kept = 0.0  # acceleration by the present pedals [m/s2]
 
     def act(self, snapshot: Snapshot) -> Command:
         v = snapshot.ego.v

@@ -39,7 +39,7 @@ def _sweep(sign, states, groups, cells, successor, probability, reward, value, s
 
 
 def _parts(arena: Arena) -> tuple[object, ...]:
-    """What the loops go over."""
+    """The arrays over which the loops iterate."""
     return (
         -1.0 if arena.reading is Reading.C else 1.0,
         arena.state_group,

@@ -1,4 +1,4 @@
-"""What is simulated: the record of one test scenario.
+"""The record of one test scenario.
 
 A field here is a setting everywhere: an option of ``cavsumo run``, a key of a scenario file, a
 keyword of the environments, a row of the table in ``docs/settings.md``.

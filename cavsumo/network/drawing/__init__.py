@@ -1,1 +1,1 @@
-"""A place from above: ``place`` says what is drawn of it, ``picture`` writes it into a file."""
+"""A place from above: ``place`` is the record of its outlines, ``picture`` draws it into a file."""

@@ -1,4 +1,4 @@
-"""A junction's picture, layer by layer: the place, the ego's routes, where testers start."""
+"""A junction's picture, layer by layer: the place, the ego's routes, the starting areas."""
 
 from __future__ import annotations
 
@@ -77,7 +77,7 @@ def _draw_names(axes: Axes, names: Sequence[StreetName], window: shapely.Geometr
 
 
 def _longest(shape: shapely.Geometry) -> LineString | None:
-    """The longest piece of what is left of a line."""
+    """The longest remaining piece of a line."""
     lines = [part for part in getattr(shape, "geoms", [shape]) if part.geom_type == "LineString"]
     return max(lines, key=lambda line: line.length, default=None)
 
@@ -129,7 +129,7 @@ def draw_routes(axes: Axes, ways: Sequence[Way]) -> None:
 
 @cache
 def font_for(text: str) -> font_manager.FontProperties | None:
-    """A font that can write a text, the usual one if it can; without its letters boxes are seen."""
+    """A font that can write a text, preferably the default; missing letters are boxes."""
     usual = font_manager.FontProperties()
     if _can_write(font_manager.findfont(usual), text):
         return usual

@@ -1,4 +1,4 @@
-"""A junction drawn from above: lanes, crossings, the ego's routes, where testers start.
+"""A junction drawn from above: lanes, crossings, the ego's routes, the starting areas.
 
 Needs matplotlib; draws into a file, never on a screen.
 """
@@ -86,7 +86,7 @@ def draw(here: InspectedNetwork, junction: Junction | None, file: Path) -> list[
 
 
 def _view(place: DrawnPlace) -> View:
-    """What to show: the routes and what lies around them, else the whole network."""
+    """The view: the routes and their surroundings, else the whole network."""
     lanes = [*place.areas["road"], *place.areas["other"], *place.areas["pavement"]]
     shown = place.lines["route"] or lanes
     west, south, east, north = shapely.total_bounds(shown).tolist()
@@ -124,7 +124,7 @@ def _titles(here: InspectedNetwork, junction: Junction | None) -> tuple[str, str
 
 
 def _legend(here: InspectedNetwork, place: DrawnPlace, ways: Sequence[Way]) -> list[Any]:
-    """What the colours mean, as far as they occur."""
+    """The legend of the colours that occur."""
     handles: list[Any] = []
     if ways:
         best = f"ego's best route ({ways[0].turn})"

@@ -1,6 +1,6 @@
-"""A place as it is drawn: one record for every picture of it.
+"""The drawing of a place: one record for every picture of it.
 
-The record has outlines in metres, by the role that each plays: made once, then written as a file's
+The record has outlines in metres by their roles: made once, then written as a file's
 picture (``picture``), as pixels, as the page's canvas, as SVG or as sumo-gui's polygons. A writer
 chooses roles and styles, and never walks the network itself.
 """
@@ -66,7 +66,7 @@ class StreetName(NamedTuple):
 
 @dataclass(frozen=True)
 class DrawnPlace:
-    """What is drawn of a place [m].
+    """The outlines of a place [m].
 
     Attributes:
         areas: polygons: "road" (junctions and lanes for cars), "other" (lanes for others),
@@ -77,7 +77,7 @@ class DrawnPlace:
         stops: the stop lines of the traffic lights on the ego's route, in their order.
         signals: both ends of every crossing at traffic lights.
         names: of streets, edge by edge.
-        credit: whom the map's licence asks to name; empty for nobody.
+        credit: the attribution that the map's licence requires; empty for none.
     """
 
     areas: Mapping[str, Sequence[shapely.Geometry]]
@@ -96,14 +96,14 @@ class DrawnPlace:
 
     @cached_property
     def _indices(self) -> dict[str, shapely.STRtree]:
-        """Where the shapes of each role are, as only few of a large network are in view."""
+        """Spatial indices of the shapes of each role: few of a large network are in view."""
         return {
             role: shapely.STRtree(list(found))
             for role, found in {**self.areas, **self.lines}.items()
         }
 
     def _seen(self, role: str, view: View) -> Iterator[shapely.Geometry]:
-        """The parts of a role's shapes that are in view; what shapely cannot cut is left whole."""
+        """The parts of a role's shapes in view; shapes that shapely cannot cut are left whole."""
         index = self._indices[role]
         for i in sorted(index.query(shapely.box(*view))):
             shape = index.geometries[i]
@@ -119,7 +119,7 @@ def site_drawn(site: Site) -> DrawnPlace:
 def place_drawn(
     network: Network, routes: Sequence[Path], lights: Sequence[Light] = ()
 ) -> DrawnPlace:
-    """A network as it is drawn, with routes of the ego; the lights are those on the first."""
+    """The drawing of a network with routes of the ego; the lights are those on the first."""
     lanes, markings = surfaces.lanes_by_kind(network), list(surfaces.markings(network))
     crossings = list(surfaces.crossings(network))
     plain = [crossing for crossing in crossings if crossing.right != PRIORITY]

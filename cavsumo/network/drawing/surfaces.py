@@ -1,4 +1,4 @@
-"""The surfaces of a network as shapes, for whoever draws it: lanes, junctions, crossings, lines."""
+"""The surfaces of a network as shapes, for drawing: lanes, junctions, crossings, lines."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from cavsumo.model.polyline import Path
 from cavsumo.network.facts import right_of_way
 from cavsumo.network.reader import Network, is_pavement, lane_areas, lane_shape
 
-ROAD, OTHER, PAVEMENT = "road", "other", "pavement"  # lanes for cars, for others, for walkers
+ROAD, OTHER, PAVEMENT = "road", "other", "pavement"  # lanes for cars, for others, for pedestrians
 STRIPE_M = 0.5  # width of a zebra's stripe, and of the gap behind it
 OSM = "Map data © OpenStreetMap contributors, ODbL"
 
@@ -38,7 +38,7 @@ def walking_areas(network: Network) -> list[Polygon]:
 
 
 def lanes_by_kind(network: Network) -> dict[str, list[shapely.Geometry]]:
-    """The surfaces of all lanes outside junctions, by who may use them."""
+    """The surfaces of all lanes outside junctions, by kind."""
     lanes = [lane for edge in network.edges for lane in edge.getLanes()]
     found: dict[str, list[shapely.Geometry]] = {ROAD: [], OTHER: [], PAVEMENT: []}
     for lane, surface in zip(lanes, lane_areas(lanes), strict=True):
@@ -47,7 +47,7 @@ def lanes_by_kind(network: Network) -> dict[str, list[shapely.Geometry]]:
 
 
 def lane_kind(lane: Any) -> str:
-    """Who may use a lane."""
+    """The kind of a lane by its users."""
     if is_pavement(lane):
         return PAVEMENT
     return ROAD if lane.allows("passenger") else OTHER
@@ -95,7 +95,7 @@ def beside(axis: LineString, offset: float) -> LineString | None:
 
 
 def credit(file: FilePath) -> str:
-    """Whom a network's licence asks to name, if it was made of OpenStreetMap's data."""
+    """The attribution of a network that was made from OpenStreetMap's data, else empty."""
     opener = gzip.open if file.suffix == ".gz" else open
     with opener(file, "rb") as stream:
         return OSM if b"OpenStreetMap" in stream.read(4096) else ""

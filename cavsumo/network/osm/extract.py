@@ -1,7 +1,7 @@
 """OpenStreetMap extracts: their roads, read as XML or .pbf, written without mappers' names.
 
-Users' names and ids, changesets and dates are never copied: an item has its id, where it is, its
-tags and what it is made of.
+Users' names and ids, changesets and dates are never copied: an item has its id, its place, its tags
+and its parts.
 """
 
 from __future__ import annotations
@@ -40,7 +40,7 @@ class Item:
         kind: one of these words.
         id: its number.
         tags: its tags.
-        lat, lon: where a node is, as written [degrees].
+        lat, lon: the place of a node, as written [degrees].
         refs: the nodes of a way.
         members: of a relation: kind, id and role.
     """
@@ -56,12 +56,12 @@ class Item:
 
 @dataclass
 class RoadExtract:
-    """What belongs to the roads of an extract, and what it says about where it is.
+    """The items of an extract that belong to its roads, and the hints to its location.
 
     Attributes:
-        nodes, ways: ids of what is to be kept.
+        nodes, ways: ids of the items to keep.
         bounds: west, south, east, north of all nodes [degrees]; None without any.
-        hints: how often which key and value of a tag occur that tell country or side of the road.
+        hints: number of occurrences of each tag that indicates the country or the side of traffic.
     """
 
     nodes: set[int] = field(default_factory=set)
@@ -117,7 +117,7 @@ class _Track(NamedTuple):
 
 
 def _tracks(file: Path, found: RoadExtract) -> list[_Track]:
-    """The roads and tracks of an extract; what it says about where it is goes into ``found``."""
+    """The roads and tracks of an extract; hints to its location are added to ``found``."""
     tracks = []
     for item in read_items(file):
         _note_hints(item, found.hints)
@@ -129,7 +129,7 @@ def _tracks(file: Path, found: RoadExtract) -> list[_Track]:
 
 
 def _nodes_within(file: Path, wanted: Container[int], box: Box | None) -> set[int]:
-    """Which of the nodes wanted are there and lie in the box, if there is one."""
+    """The required nodes that exist and lie in the box, if there is one."""
     return {
         item.id
         for item in read_items(file)
@@ -170,11 +170,16 @@ def write_roads(file: Path, roads: RoadExtract, target: TextIO) -> None:
     target.write("</osm>\n")
 
 
-def read_items(file: Path) -> Iterator[Item]:
-    """The items of an extract in the order of the file; raises InputError in one sentence."""
+def check_extract(file: Path) -> None:
+    """Raise InputError unless the file is there."""
     if not file.is_file():
         what = "is a folder" if file.is_dir() else "no such file"
         raise InputError(f"extract {str(file)!r}: {what}")
+
+
+def read_items(file: Path) -> Iterator[Item]:
+    """The items of an extract in the order of the file; raises InputError in one sentence."""
+    check_extract(file)
     if file.suffix == ".pbf":
         yield from _pbf_items(file)
         return
@@ -280,7 +285,7 @@ def _is_code(text: str) -> bool:
 
 
 def _off_the_data(box: Box | None, bounds: Box | None) -> str:
-    """Why no road was found."""
+    """The reason why no road was found."""
     if box is None or bounds is None:
         return "none of its roads has a node in it: the extract is incomplete"
     reach = ",".join(f"{x:.4f}" for x in bounds)

@@ -1,4 +1,4 @@
-"""On which side of the road traffic keeps, by an extract's tags and place, and how certain that is.
+"""The side of the road on which traffic keeps, by an extract's tags and place, and its certainty.
 
 The areas are rough outlines of our own making, drawn around the countries that keep left. Along
 their land borders they are off by tens of kilometres; over the sea they are wide.
@@ -110,11 +110,11 @@ DEGREE_KM = 111.2
 
 
 class Side(NamedTuple):
-    """On which side traffic keeps where an extract lies.
+    """The side on which traffic keeps in the area of an extract.
 
     Attributes:
         left: it keeps left.
-        why: what says so, half a sentence.
+        why: the reason, as the first half of a sentence.
         certain: whether tags and place leave no doubt.
     """
 
@@ -124,12 +124,12 @@ class Side(NamedTuple):
 
     @property
     def words(self) -> str:
-        """Why, and what follows."""
+        """The reason and the side, as one sentence."""
         return f"{self.why}, where traffic keeps {'left' if self.left else 'right'}"
 
 
 def side(hints: Mapping[tuple[str, str], int], bounds: Box) -> Side:
-    """On which side traffic keeps by an extract's tags, else by where it lies.
+    """The side on which traffic keeps, by an extract's tags or else by its place.
 
     Args:
         hints: tags of the extract that tell country or side, and how often.
@@ -144,7 +144,7 @@ def side(hints: Mapping[tuple[str, str], int], bounds: Box) -> Side:
 
 
 def warning(found: Side, left_hand: bool) -> str | None:
-    """What to tell who asked for a side of the road that an extract may not have."""
+    """The warning if the chosen side of the road is perhaps not that of the extract."""
     if found.left == left_hand:
         return None
     how = "with" if found.left else "without"
@@ -152,7 +152,7 @@ def warning(found: Side, left_hand: bool) -> str | None:
 
 
 def _by_tags(hints: Mapping[tuple[str, str], int]) -> Side | None:
-    """What most tags say, driving_side before countries; certain when none says otherwise."""
+    """The side by most tags, driving_side before countries; certain if no tag contradicts."""
     sides, countries = Counter[str](), Counter[str]()
     for (key, value), count in hints.items():
         if key == "driving_side" and value in ("left", "right"):
@@ -170,8 +170,9 @@ def _by_tags(hints: Mapping[tuple[str, str], int]) -> Side | None:
 
 
 def _by_place(bounds: Box) -> Side:
-    """What the outlines say of the middle of the extract; certain when all of it is well inside
-    one of them, or far from all."""
+    """The side by the outlines around the middle of the extract.
+
+    It is certain if all of the extract is well inside one outline, or far from all."""
     west, south, east, north = bounds
     centre = (west + east) / 2, (south + north) / 2
     reach = _distance_km(centre, (east, north))

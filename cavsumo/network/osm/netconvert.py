@@ -1,6 +1,6 @@
 """SUMO's netconvert: the options that make a testable network of OpenStreetMap's roads.
 
-The program comes with the package eclipse-sumo and is run as it is, in a folder of its own.
+The program comes with the package eclipse-sumo and runs unchanged, in a temporary folder.
 """
 
 from __future__ import annotations
@@ -48,7 +48,7 @@ OSM_OPTIONS = (
 TIME_LIMIT_S = 600.0
 KIND_WIDTH = 60  # characters of a kind of warning
 SHOWN = 3  # kinds of warnings in a summary
-# What its errors mean to somebody who imports a map.
+# Explanations of its errors for a user who imports a map.
 MEANINGS = {"No edges loaded.": "the extract holds no road that cars may use"}
 
 
@@ -83,7 +83,7 @@ def typemap_option(folder: str) -> str:
 def netconvert(
     options: Iterable[str], folder: Path, time_limit_s: float = TIME_LIMIT_S
 ) -> list[str]:
-    """Run netconvert in a folder: the lines that it said, without machine paths.
+    """Run netconvert in a folder; returns the lines of its output, without machine paths.
 
     Raises InputError in one sentence when it refuses, crashes or takes too long.
     """
@@ -111,7 +111,7 @@ def netconvert(
 
 
 def _failure(status: int, lines: Sequence[str]) -> str:
-    """Why a run of netconvert gave no network, in one sentence."""
+    """The reason why a run of netconvert gave no network, in one sentence."""
     number = -status if status < 0 else status - 128 if 128 < status <= 159 else 256 - status
     if status < 0 or status > 128:  # wrappers make 139 or 245 of -11
         try:
@@ -128,7 +128,7 @@ def _failure(status: int, lines: Sequence[str]) -> str:
 
 
 def warning_kinds(lines: Iterable[str]) -> Counter[str]:
-    """How many warnings there are of each kind: the same words around other ids and numbers."""
+    """The number of warnings of each kind: equal words around different ids and numbers."""
     kinds: Counter[str] = Counter()
     for line in lines:
         if line.startswith("Warning: "):

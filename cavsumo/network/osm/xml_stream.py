@@ -1,8 +1,8 @@
-"""OSM XML as a stream: an item at a time, everything else forgotten as it is read.
+"""OSM XML as a stream: one item at a time, all other content discarded while it is read.
 
-No tree is built, so memory holds one item, whatever else a file contains and however often. What
-would still grow without bound (nesting, names, one tag or one item of any length) has limits far
-beyond those of OpenStreetMap's own interface (2,000 nodes a way, 32,000 members a relation).
+No tree is built, so memory holds one item, for a file of any size. Quantities that could still grow
+without bound (nesting, names, the length of a tag or an item) have limits far above those of
+OpenStreetMap's own interface (2,000 nodes per way, 32,000 members per relation).
 """
 
 from __future__ import annotations
@@ -45,11 +45,11 @@ def read_elements(stream: IO[bytes], name: str) -> Iterator[Element]:
     """The items of OSM XML in the order of the file.
 
     ``name`` is that of the file, for messages. Raises InputError for XML that is no OSM, is
-    incomplete by its own words or exceeds a limit; ElementTree.ParseError for what is no XML.
+    marked as incomplete or exceeds a limit; ElementTree.ParseError for invalid XML.
     """
     target = _Target(name)
     parser = ElementTree.XMLParser(target=target)
-    unseen = 0  # bytes since something came out of the parser
+    unseen = 0  # bytes since the last event of the parser
     while chunk := stream.read(CHUNK):
         before = target.events
         _feed(parser, chunk, name)
@@ -70,7 +70,7 @@ def _feed(parser: ElementTree.XMLParser, chunk: bytes, name: str) -> None:
 
 
 class _Target:
-    """What the parser calls: keeps the item under way and the items that are whole.
+    """The target of the parser: keeps the current item and the completed items.
 
     Attributes:
         events: how often it was called.
@@ -84,7 +84,7 @@ class _Target:
         self._remark: str | None = None
 
     def take(self) -> list[Element]:
-        """The items that are whole since the last call."""
+        """The items completed since the last call."""
         whole, self._whole = self._whole, []
         return whole
 
@@ -125,18 +125,18 @@ class _Target:
             self._remark += text
 
     def comment(self, text: str) -> None:
-        """A comment, which is forgotten."""
+        """A comment, which is discarded."""
         self.events += 1
 
     def pi(self, name: str, text: str | None = None) -> None:
-        """An instruction to other programs, which is forgotten."""
+        """An instruction to other programs, which is discarded."""
         self.events += 1
 
     def close(self) -> None:
         """The file ends."""
 
     def _check(self, tag: str, attrib: dict[str, str]) -> None:
-        """Refuse what makes the parser itself grow."""
+        """Refuse input that makes the parser itself grow."""
         self._names.add(tag)
         self._names.update(attrib)
         if len(self._names) > NAMES:
@@ -145,5 +145,5 @@ class _Target:
             raise self._refused(f"elements in each other, more than {DEPTH} deep")
 
     def _refused(self, why: str) -> InputError:
-        """The error that says why the file is no extract."""
+        """The error that gives the reason why the file is not an extract."""
         return InputError(f"extract {self._name!r}: {why}")

@@ -1,1 +1,1 @@
-"""Pages for the browser that need nothing but themselves: their frame, colours and script."""
+"""Self-contained pages for the browser: their frame, colours and script."""

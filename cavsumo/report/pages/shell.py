@@ -1,4 +1,4 @@
-"""A template with its style and its script as one page that needs nothing but itself."""
+"""A template with its style and its script as one self-contained page."""
 
 from __future__ import annotations
 

@@ -1,10 +1,10 @@
-"""What the page draws over time: the ego's speed, the gap and the time to collision.
+"""The curves of the page over time: the ego's speed, the gap and the time to collision.
 
 * gap: the smallest distance between the ego's box and a tester's [m], 0 where they touch;
 * time to collision: gap / closing speed, the closing speed being that of the two centres along the
-  line between them; the smallest over the testers that come nearer, nothing where none does. Of
-  those who are on the carriageway or entering it, or touch the ego: who stays on the pavement is
-  passed.
+  line between them; the smallest over the testers that come nearer, none without such testers.
+  Testers count if they are on the carriageway or entering it, or touch the ego; the ego passes
+  those that stay on the pavement.
 """
 
 from __future__ import annotations
@@ -19,8 +19,8 @@ from cavsumo.model.carriageway import Roads
 from cavsumo.model.geometry import Box, gap
 from cavsumo.results.traces import Shape
 
-CLOSING_MPS = 0.01  # slower than this nobody comes nearer
-ENTERING_S = 1.0  # whose front is on the carriageway so soon, walking straight on, is entering it
+CLOSING_MPS = 0.01  # a slower approach does not count
+ENTERING_S = 1.0  # a body whose front is on the carriageway within this time is entering it
 
 
 class CurvePoint(NamedTuple):

@@ -1,4 +1,4 @@
-"""What the page says of an episode in words."""
+"""The texts of the page about an episode."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ def headline(record: Record) -> str:
 
 
 def verdict(row: Mapping[str, str]) -> str:
-    """What happened, as a sentence."""
+    """The result of the episode, as a sentence."""
     outcome, tester = row["outcome"], row["tester"] or "a tester"
     triggered = f"{row['assertion']} was triggered by {tester} at {_short(row['trigger_time_s'])} s"
     if outcome == VIOLATED and row["impact_speed_mps"]:
@@ -27,22 +27,22 @@ def verdict(row: Mapping[str, str]) -> str:
     if outcome == VIOLATED:
         return f"The ego violated {row['assertion']} at {_short(row['violation_time_s'])} s."
     if outcome == HELD:
-        return f"A test that the ego passed: {triggered}, and it coped."
+        return f"The ego passed the test: {triggered}."
     if outcome == UNFAIR:
-        return f"No fair test: {tester} left the ego no chance."
+        return f"No fair test: the ego could not have avoided {tester}."
     if outcome == INVALID:
         return f"Not valid: {row['breach']}."
-    return "No test: what the assertion asks for did not come about."
+    return "No test: the precondition of the assertion never held."
 
 
 def marks(row: Mapping[str, str]) -> list[dict[str, Any]]:
-    """The moments to be marked: trigger and violation, in seconds."""
+    """The marked moments: trigger and violation, in seconds."""
     named = (("trigger", "trigger_time_s"), ("violation", "violation_time_s"))
     return [{"name": name, "time": float(row[key])} for name, key in named if row[key]]
 
 
 def facts(record: Record, trace: Trace) -> list[tuple[str, str]]:
-    """What identifies the episode, and its figures."""
+    """The identity of the episode, and its figures."""
     row, scenario = record.row, record.plan.scenario
     found = [
         ("Network", scenario.net.name),
@@ -77,15 +77,15 @@ def _preventable(row: Mapping[str, str]) -> str:
 
 
 def ego_words(scenario: Scenario) -> str:
-    """The ego with its parameters, as they were given or, SUMO's driver, as they are."""
+    """The ego with its parameters: those that were given or, for SUMO's driver, all."""
     params = scenario.ego_params
-    if scenario.ego in EGOS:  # one from outside is not built to be shown
+    if scenario.ego in EGOS:  # an external one is not built here
         params = getattr(EGOS.make(scenario.ego, params), "attributes", params)
     return " ".join((scenario.ego, *(f"{k}={v}" for k, v in params.items())))
 
 
 def traffic_words(scenario: Scenario) -> str:
-    """Where the background traffic comes from."""
+    """The source of the background traffic."""
     if scenario.traffic is not None:
         return "drawn, {:g},{:g} per minute and km".format(*scenario.traffic)
     return scenario.routes.name if scenario.routes else "none"

@@ -10,9 +10,9 @@ import base64
 from collections.abc import Iterable, Sequence
 
 MILLI = 1000.0  # positions in millimetres, speeds in mm/s, times in milliseconds
-CENTI = 100.0  # what does not move: centimetres
+CENTI = 100.0  # of fixed objects: centimetres
 ANGLE = 10_000.0  # tenths of a milliradian
-NOTHING = -1  # where there is no value, of quantities that are never negative
+NOTHING = -1  # stands for no value of a quantity that is never negative
 
 
 def packed(values: Iterable[int]) -> str:

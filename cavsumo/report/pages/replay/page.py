@@ -1,4 +1,4 @@
-"""A trace and its network into one page: data for the player, and the facts beside it."""
+"""One page from a trace and its network: data for the player, and the facts beside it."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from cavsumo.results.traces import Shape, Trace, states
 
 FILES = Path(__file__).parent
 ZONES = "reaction-zone"  # the assertion whose zones are drawn, with its parameters
-MARGIN_M = 25.0  # of network around everybody
+MARGIN_M = 25.0  # of network around all bodies
 POSE = (MILLI, MILLI, MILLI, ANGLE)
 
 
@@ -65,14 +65,14 @@ def episode(record: Record, trace: Trace, site: Site) -> dict[str, Any]:
 
 
 def _or_nothing(value: float | None) -> int:
-    """A value in thousandths; where there is none, or it is beyond all graphs, a sign for that."""
+    """A value in thousandths; a sign if there is none, or if it is beyond all graphs."""
     return NOTHING if value is None or value > 1e5 else round(value * MILLI)
 
 
 def _tracks(
     frames: Sequence[Mapping[str, Any]], met: Mapping[str, Shape]
 ) -> Iterator[dict[str, Any]]:
-    """Everybody's way, the ego first; who leaves and comes back has two."""
+    """The tracks of all bodies, the ego first; a body that leaves and returns has two."""
     open_: dict[str, tuple[str, int, list[list[float]]]] = {}
     done: list[tuple[str, str, int, list[list[float]]]] = []
     for i, frame in enumerate(frames):
@@ -113,7 +113,7 @@ def _zones(record: Record, frames: Sequence[Mapping[str, Any]], shape: Shape) ->
 
 
 def _extent(frames: Sequence[Mapping[str, Any]], site: Site) -> View:
-    """What holds everybody at all times, and the ego's route [m]."""
+    """The extent of all bodies at all times, and of the ego's route [m]."""
     points = list(site.route.path.points)
     points += [(s[0], s[1]) for frame in frames for _, _, s in states(frame)]
     west, east = min(p[0] for p in points), max(p[0] for p in points)

@@ -9,7 +9,7 @@ from cavsumo.report.pages.replay.packing import CENTI, columns, shapes
 
 
 def scenery(place: DrawnPlace, view: View) -> dict[str, Any]:
-    """What is drawn of a place within a view, packed.
+    """The outlines of a place within a view, packed.
 
     The stop lines are in "lights": their two ends, x and y each [cm].
     """

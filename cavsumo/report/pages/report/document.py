@@ -44,7 +44,7 @@ TITLES = {
 
 
 class Plot(NamedTuple):
-    """A plot with its title, its legend and what is left out of it.
+    """A plot with its title, its legend and a note on the parts left out.
 
     Attributes:
         legend: name, number of the colour and dashes of each line.
@@ -140,7 +140,7 @@ def _ratios(report: Report) -> Iterator[Plot]:
 def _plot(
     title: str, draw: Callable[[Sequence[Any], str], str], bars: Sequence[Any], total: int
 ) -> Plot:
-    """A plot of bars; says how many are left out."""
+    """A plot of bars, with the number of those left out."""
     note = f"{total - len(bars)} more are in the table." if total > len(bars) else ""
     return Plot(title, Markup(draw(bars, title)), note=note)
 

@@ -23,22 +23,22 @@ from cavsumo.results.failures import ORDER, failure_kind
 from cavsumo.results.reading import inside, whole_lines
 from cavsumo.results.traces import read_trace
 
-FAILURES = 50  # are listed at most, or as many as are wanted as pages
-TESTS = 10  # passed tests are listed if none is wanted as a page
+FAILURES = 50  # are listed at most, or as many as there are pages
+TESTS = 10  # passed tests are listed if there are no pages
 
 
 @dataclass(frozen=True)
 class LinkedRun:
-    """A run worth looking at.
+    """A run for inspection.
 
     Attributes:
         index: of its row in the evidence.
-        batch, run, agent, tester, setting: which one it is.
+        batch, run, agent, tester, setting: its identity.
         failed: whether the ego failed.
         kind: of failure, empty for none (``failures.failure_kind``).
         time, speed: when it was triggered or failed [s]; closing speed then [m/s], None if unknown.
         alike: failures of its kind, itself included; None unless it is the first of them.
-        command: what plays it again.
+        command: the command that replays it.
         page: the name of its page, empty without one.
     """
 
@@ -81,7 +81,7 @@ def _looks(
     settings: Mapping[int, str],
     alike: Mapping[tuple[str, int], int],
 ) -> list[LinkedRun]:
-    """Rows as runs to look at."""
+    """Rows as runs for inspection."""
     found = []
     for row in rows.itertuples():
         test, failed = report.tests[int(row.Index)], row.outcome == "violated"
@@ -128,7 +128,7 @@ def _name(look: LinkedRun, several: bool) -> str:
 def write_pages(
     looks: Sequence[LinkedRun], batches: Sequence[Batch], scenes: Sequence[BatchPlace], folder: Path
 ) -> None:
-    """Write the pages of those that have a name for it into a folder; raises InputError."""
+    """Write the pages of the runs that have a page name into a folder; raises InputError."""
     wanted = [look for look in looks if look.page]
     if not wanted:
         return

@@ -1,6 +1,6 @@
-"""Where along the junction tests happen: dots on the network, those that are close together one.
+"""Maps of the places of tests: dots on the network, nearby ones merged.
 
-A test is shown where its tester was at the trigger, a failure also where it was at the impact.
+A test is shown at its tester's place at the trigger, a failure also at that of the impact.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ MEANING = {
 }
 MOST = 1500  # dots on a map
 APART_M = 0.5  # dots that are closer become one; more where there are too many
-MARGIN_M, LEAST_M = 20.0, 60.0  # of network around the dots; how much is shown at least
+MARGIN_M, LEAST_M = 20.0, 60.0  # of network around the dots; least size of the view
 
 
 class Spot(NamedTuple):
@@ -31,7 +31,7 @@ class Spot(NamedTuple):
 
     Attributes:
         x, y: where [m].
-        group: index of the group it is of.
+        group: index of its group.
         sort: passed, failed or impact.
         run: number of its row in the evidence.
     """
@@ -48,7 +48,7 @@ class Dot(NamedTuple):
 
     Attributes:
         x, y: their middle [m].
-        many: how many.
+        many: their number.
         run: the first of them.
     """
 
@@ -68,11 +68,11 @@ class Map:
         name: of the network.
         problem: why the network is not drawn, empty if it is.
         width, height, radius: of the view, and of a dot for one [m].
-        areas, lines: what is drawn of the network, as SVG paths by what they are.
-        dots: where things happened, the rarer sorts last.
+        areas, lines: outlines of the network, as SVG paths by kind.
+        dots: places of events, the rarer kinds last.
         groups: those that have any.
-        apart: dots stand for what is closer together than this [m].
-        credit: whom the licence of the map data asks to name.
+        apart: events closer together than this are merged into one dot [m].
+        credit: the attribution that the licence of the map data requires.
     """
 
     name: str
@@ -89,7 +89,7 @@ class Map:
 
 
 def maps(report: Report, scenes: Sequence[BatchPlace]) -> list[Map]:
-    """A map for each scene in which any test is known to have happened somewhere."""
+    """A map for each scene with a test of known place."""
     spots: dict[int, list[Spot]] = {}
     for batch, spot in _spots(report):
         scene = next(i for i, scene in enumerate(scenes) if batch in scene.batches)
@@ -112,7 +112,7 @@ def _spots(report: Report) -> Iterator[tuple[int, Spot]]:
 
 
 def merged(spots: Sequence[Spot], most: int = MOST) -> tuple[list[Dot], float]:
-    """Spots in cells of a grid as one dot each, and how wide the cells are [m]."""
+    """Spots merged into one dot for each cell of a grid, and the width of the cells [m]."""
     apart = APART_M
     while True:
         cells: dict[tuple[int, int, int, str], list[Spot]] = {}
@@ -167,7 +167,7 @@ def _map(scene: BatchPlace, spots: Sequence[Spot]) -> Map:
 
 
 def _view(dots: Sequence[Dot]) -> View:
-    """What holds all dots, with some network around; not too small, not too high."""
+    """The view of all dots, with some network around; not too small, not too high."""
     xs, ys = [dot.x for dot in dots], [dot.y for dot in dots]
     x, y = (min(xs) + max(xs)) / 2, (min(ys) + max(ys)) / 2
     wide = max(LEAST_M, max(xs) - min(xs) + 2 * MARGIN_M)

@@ -1,7 +1,7 @@
-"""The plots of the page: SVG by matplotlib, whose text stays text and whose colours are the page's.
+"""The plots of the page: SVG by matplotlib, with text as text and the page's colours.
 
 The page is light or dark as the reader's system is, so colours are named in its style sheet: each
-is drawn as a stand-in which is replaced by the name.
+is drawn with a placeholder colour that is replaced by the name.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ from cavsumo.report.rates import Share
 from cavsumo.results.kaplan_meier import Curve
 
 WIDTH_IN = 3.6  # as narrow as a phone, so that text is as large there as elsewhere
-ROW_IN, FRAME_IN = 0.26, 0.3  # height of a line of bars, and of what is around them
+ROW_IN, FRAME_IN = 0.26, 0.3  # height of a line of bars, and of the space around them
 LABEL = 30  # letters of a name beside an axis
 INK, SOFT, EDGE = "#010201", "#010202", "#010203"
 SERIES = [f"#0103{i:02x}" for i in range(8)]
@@ -53,7 +53,7 @@ STYLE: dict[str, Any] = {
 
 
 class Bar(NamedTuple):
-    """A figure with its interval; None for what is not known."""
+    """A figure with its interval; None for unknown values."""
 
     label: str
     value: float | None
@@ -75,7 +75,7 @@ def ratio_bar(label: str, one: PairedComparison, text: str) -> Bar:
 
 
 def shares_plot(bars: Sequence[Bar], name: str) -> str:
-    """Shares from 0 to as far as they go, one line each; the dot is the share."""
+    """Shares from 0 to their maximum, one line each; the dot is the share."""
     with _style(name):
         figure, axes = _lines(bars)
         ends = [end for bar in bars for end in (bar.high, bar.value) if end is not None]
@@ -92,7 +92,7 @@ def shares_plot(bars: Sequence[Bar], name: str) -> str:
 
 
 def ratios_plot(bars: Sequence[Bar], name: str) -> str:
-    """Ratios on a logarithmic axis with 1 in it; an end without a bound goes to the frame."""
+    """Ratios on a logarithmic axis that contains 1; an infinite end is drawn to the frame."""
     finite = [
         value
         for bar in bars
@@ -172,7 +172,7 @@ def _interval(axes: Axes, i: int, bar: Bar, frame: tuple[float, float]) -> None:
 
 
 def _plain(axes: Axes) -> None:
-    """No frame but the axis below, nothing painted behind."""
+    """Remove the frame except the lower axis, and the background."""
     axes.patch.set_visible(False)
     for side in ("top", "right", "left"):
         axes.spines[side].set_visible(False)
@@ -180,7 +180,7 @@ def _plain(axes: Axes) -> None:
 
 
 def _short(names: Sequence[str]) -> list[str]:
-    """Names as short lines, to stand beside an axis: files without what all begin with."""
+    """Names as short lines beside an axis: files without their common beginning."""
     files = {name.partition(JOINT)[0] for name in names if JOINT in name}
     letters = os.path.commonprefix(list(files)) if len(files) > 1 else ""  # noqa: RUF071  # letters
     begin = max(letters.rfind(mark) for mark in "-_/") + 1
@@ -198,7 +198,7 @@ def _svg(figure: Figure) -> str:
     figure.patch.set_visible(False)
     stream = io.StringIO()
     metadata = {"Date": None, "Creator": None, "Format": None, "Type": None}
-    with warnings.catch_warnings():  # the browser has the letters that this font has not
+    with warnings.catch_warnings():  # the browser has the letters that are missing in this font
         warnings.filterwarnings("ignore", message="Glyph")
         figure.savefig(stream, format="svg", metadata=metadata)
     text = stream.getvalue()

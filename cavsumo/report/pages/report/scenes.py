@@ -1,4 +1,4 @@
-"""Where the batches of a report were played, as far as that is here to be shown."""
+"""The places of the batches of a report, if their files are available."""
 
 from __future__ import annotations
 
@@ -21,9 +21,9 @@ class BatchPlace:
 
     Attributes:
         name: of its network.
-        plan, site: the plan with its files where they are here, the network with the ego's route;
-            None when they are not here any more.
-        problem: why not, empty when they are.
+        plan, site: the plan with its present files, the network with the ego's route; None if files
+            are missing.
+        problem: why they are missing, empty if not.
         batches: indices of its batches.
     """
 
@@ -47,7 +47,7 @@ def scenes(batches: Sequence[Batch]) -> list[BatchPlace]:
 
 
 def _scene(batch: Batch) -> BatchPlace:
-    """Where a batch was played: the very files, known by their checksums."""
+    """The place of a batch: the same files, identified by their checksums."""
     name = batch.plan.scenario.name
     try:
         record = Record(batch.plan, {}, None, batch.manifest, batch.csv_file)
@@ -58,7 +58,7 @@ def _scene(batch: Batch) -> BatchPlace:
 
 
 def _some_trace(batch: Batch) -> Trace | None:
-    """A trace that tells the box of an ego from outside; None for our egos, or without traces."""
+    """A trace with the box of an external ego; None for built-in egos, or without traces."""
     if is_ours(batch.plan.scenario):
         return None
     for _, row in whole_lines(batch.csv_file):

@@ -1,4 +1,4 @@
-"""What the page says in sentences: the answer, how sure it is, what was tested."""
+"""The sentences of the page: the answer, its certainty, the tested scenario."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from cavsumo.report.pages.replay.facts import ego_words, traffic_words
 from cavsumo.report.rates import SEQUENTIAL, Rates, Share
 
 ANSWERS = 12  # groups that are told in a sentence each
-ERRORS = 5  # that are quoted
+ERRORS = 5  # messages that are quoted
 BATCHES = 6  # results that are told in full
 JOINT = " · "  # between a file, an agent and a value in a name
 Facts = list[tuple[str, str]]
@@ -30,7 +30,7 @@ def title(report: Report) -> str:
 
 
 def headline(report: Report) -> str:
-    """What was tested against what, in a line."""
+    """The ego, the testers and the scenario, in a line."""
     batches = report.evidence.batches
     egos = list(dict.fromkeys(_ego(batch.plan.scenario) for batch in batches))
     testers = list(dict.fromkeys(_testers(batch.plan.scenario) for batch in batches))
@@ -53,7 +53,7 @@ def _who(told: Told, by: str) -> str:
 
 
 def answers(report: Report) -> list[str]:
-    """What each group found, the answer first."""
+    """The results of each group, the answer first."""
     found = [answer(one, _who(one, report.by)) for one in report.rates[:ANSWERS]]
     if len(report.rates) > ANSWERS:
         found.append(f"{len(report.rates) - ANSWERS} more groups are in the table.")
@@ -90,13 +90,13 @@ def _judged(one: Rates) -> str:
 
 
 def certainty(report: Report) -> str:
-    """What the intervals are."""
+    """The kinds of the intervals."""
     methods = {name for one in report.rates for name in one.tests.intervals}
     if not methods:
         return ""
     how = "In brackets: 95 % intervals in per cent"
     if methods == {SEQUENTIAL}:
-        return f"{how}, as confidence sequences, which hold whenever one chooses to stop."
+        return f"{how}, as confidence sequences, which are valid at any stopping time."
     if SEQUENTIAL in methods:
         return (
             f"{how}, by Wilson; confidence sequences for batches that could stop on what they "
@@ -106,7 +106,7 @@ def certainty(report: Report) -> str:
 
 
 def excluded(report: Report) -> str:
-    """What is no test, and what does not count at all."""
+    """Unfair, invalid and error episodes."""
     unfair = sum(one.unfair.count for one in report.rates)
     invalid = sum(one.invalid for one in report.rates)
     missing = sum(one.errors for one in report.rates)
@@ -114,7 +114,7 @@ def excluded(report: Report) -> str:
     said = "No episode was unfair" if not unfair else f"{_many(unfair, 'episode')} of {episodes} "
     if unfair:
         said += "were unfair: " if unfair > 1 else "was unfair: "
-        said += "a tester left the ego no chance, so they count as tried but not as tests"
+        said += "the ego could not have stopped, so they count as episodes but not as tests"
     if invalid:
         said += f". {invalid} invalid: a tester broke the rules of the world, so they are left out"
     if missing:
@@ -133,14 +133,14 @@ def invalid(report: Report) -> list[str]:
 
 
 def _first(report: Report, outcome: str, column: str) -> list[str]:
-    """What a column says of the first episodes with an outcome."""
+    """A column of the first episodes with an outcome."""
     rows = report.evidence.rows
     found = rows[rows["outcome"] == outcome].head(ERRORS).to_dict("records")
     return [f"{row['file']} run {row['run']}: {row[column]}" for row in found]
 
 
 def facts(batch: Batch, episodes: int) -> Facts:
-    """What was tested in a batch, and with what."""
+    """The scenario and versions of a batch."""
     plan, manifest, scenario = batch.plan, batch.manifest, batch.plan.scenario
     found = [
         ("Network", str(scenario.net)),
@@ -174,12 +174,12 @@ def command(batch: Batch) -> str:
 
 
 def _testers(scenario: Scenario) -> str:
-    """How many of which kind."""
+    """The number of testers of each kind."""
     return f"{scenario.testers} x {scenario.kind}"
 
 
 def _ego(scenario: Scenario) -> str:
-    """The ego; one that cannot be loaded here by what was said of it."""
+    """The ego; one that cannot be loaded here by its recorded name."""
     try:
         return ego_words(scenario)
     except CavsumoError:

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Callable
 from pathlib import Path
 
 import pytest
+from ego_writer import NAMES, run, writer_in
 from support import rows, traces
 
 from cavsumo.batch.prepared import PreparedBatch
@@ -14,46 +14,12 @@ from cavsumo.cli.command_line import main
 from cavsumo.egos.ego_files import OutputWatch, data_files
 from cavsumo.results.reading import read_manifest
 
-# Drives on. It reads the file that its first argument names and writes to those of the others: to
-# "start*" as it starts (and empties it first), to "log*" in each episode, to "once*" in the first.
-WRITER = r"""
-import json, os, sys
-
-read, *names = sys.argv[1:]
-gain = float(open(read).read())
-for name in names:
-    if name.startswith("start"):
-        open(name, "w").write(f"{os.getpid()}\n")
-for line in sys.stdin:
-    message = json.loads(line)
-    answers = {"hello": {"type": "hello", "version": 1}, "reset": {"type": "ready"}}
-    if message["type"] == "reset":
-        for name in names:
-            if name.startswith("log") or (name.startswith("once") and not os.path.exists("did")):
-                open(name, "a").write(f"{os.getpid()}\n")
-        open("did", "w").close()
-    if message["type"] == "close":
-        break
-    reply = {"step": message.get("step"), "acceleration": gain}
-    print(json.dumps(answers.get(message["type"], reply)), flush=True)
-"""
-SHORT = "-r none --agent noop --testers 1 --end 1 --trace all -q".split()
-NAMES = ["start.txt", "log.txt", "once.txt"]
-EGO = f"exec:{sys.executable} writer.py gain.txt {' '.join(NAMES)}"
-
 
 @pytest.fixture
 def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """The working folder, with the ego that writes."""
-    (tmp_path / "writer.py").write_text(WRITER, encoding="utf-8")
-    (tmp_path / "gain.txt").write_text("0.0")
     monkeypatch.chdir(tmp_path)
-    return tmp_path
-
-
-def run(net: Path, *words: str, output: str = "r.csv") -> int:
-    """``cavsumo run`` with that ego."""
-    return main(["run", "-n", str(net), "--ego", EGO, *SHORT, "-o", output, *words])
+    return writer_in(tmp_path)
 
 
 @pytest.mark.parametrize("there", [[], NAMES], ids=["new", "old"])
@@ -89,16 +55,6 @@ def test_the_traces_are_the_same_for_any_number_of_workers(
     assert len(found[0]) == 4
 
 
-def test_a_worker_that_is_replaced_does_not_mind(
-    networks: dict[str, Path], here: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """One episode a process: each checks the files that the egos before it wrote to."""
-    monkeypatch.setattr("cavsumo.batch.worker.LIFETIME", 1)
-    (here / "log.txt").write_text("from an earlier run\n")
-    assert run(networks["pedestrians"], "--runs", "3") == 0
-    assert [row["outcome"] for row in rows(here / "r.csv")] == ["not_triggered"] * 3
-
-
 def test_resume_replay_and_merge_do_not_mind_outputs(
     networks: dict[str, Path], here: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -132,17 +88,6 @@ def test_an_input_that_changes_is_noticed(
     assert f"sha256: {name} was" in capsys.readouterr().err
     assert main(["replay", "r.csv", "0", "--trust"]) == 0
     assert f"sha256: {name} was" in capsys.readouterr().err
-
-
-def test_a_program_that_changes_under_a_batch_ends_it(
-    networks: dict[str, Path], here: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """A program that rewrites itself is another ego in the next process."""
-    monkeypatch.setattr("cavsumo.batch.worker.LIFETIME", 1)
-    script = here / "writer.py"
-    script.write_text(WRITER + "    open('writer.py', 'a').write('#')\n", encoding="utf-8")
-    assert run(networks["pedestrians"], "--runs", "3") == 3
-    assert len(rows(here / "r.csv")) < 3
 
 
 @pytest.mark.parametrize(

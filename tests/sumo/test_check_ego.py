@@ -1,16 +1,13 @@
-"""``cavsumo check-ego`` passes every correct ego: the built-in ones, the examples, the docs'."""
+"""``cavsumo check-ego`` passes every correct ego: the built-in ones and those of the docs."""
 
 from __future__ import annotations
 
 import re
-import shutil
-import subprocess
-import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
-from support import ROOT, serving
+from support import ROOT
 
 from cavsumo.cli.command_line import main
 from cavsumo.egos import EGOS, Acceleration, Command, Ego
@@ -19,8 +16,6 @@ from cavsumo.model.snapshot import Snapshot
 from cavsumo.testing import ego_checks
 from cavsumo.testing.scripts import EMPTY, drive, ground
 
-EXAMPLES = ROOT / "examples" / "egos"
-PYTHON_EXAMPLE = EXAMPLES / "stop_for_pedestrians.py"
 BLOCK = re.compile(r"```python\n(.*?)```", re.DOTALL)
 
 
@@ -36,25 +31,6 @@ def documented() -> dict[str, str]:
 
 
 DOCUMENTED = documented()
-
-
-@pytest.fixture(scope="module")
-def server() -> Iterator[str]:
-    """The Python example as a server; its spec."""
-    with serving(PYTHON_EXAMPLE) as spec:
-        yield spec
-
-
-@pytest.fixture(scope="module")
-def compiled(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The C example, compiled."""
-    compiler = shutil.which("cc") or shutil.which("gcc") or shutil.which("clang")
-    if compiler is None:
-        pytest.skip("there is no C compiler here")
-    program = tmp_path_factory.mktemp("c") / "stop_for_pedestrians"
-    source = EXAMPLES / "stop_for_pedestrians.c"
-    subprocess.run([compiler, "-O2", "-o", str(program), str(source), "-lm"], check=True)
-    return program
 
 
 def passes(ego: str, net: Path, capsys: pytest.CaptureFixture[str]) -> bool:
@@ -88,21 +64,6 @@ def test_the_egos_of_the_docs_pass(
     """README's Brake stops for anybody near its lane, pedestrians on the pavement included."""
     module = controller(DOCUMENTED[name])
     assert passes(f"{module}:{name}", networks["crossing"], capsys)
-
-
-def test_the_example_in_python_passes(
-    networks: dict[str, Path], capsys: pytest.CaptureFixture[str], server: str
-) -> None:
-    """As a program and as a server."""
-    for ego in (f"exec:{sys.executable} {PYTHON_EXAMPLE}", server):
-        assert passes(ego, networks["crossing"], capsys)
-
-
-def test_the_example_in_c_passes(
-    networks: dict[str, Path], capsys: pytest.CaptureFixture[str], compiled: Path
-) -> None:
-    """As a program."""
-    assert passes(f"exec:{compiled}", networks["crossing"], capsys)
 
 
 class Shy(Ego):

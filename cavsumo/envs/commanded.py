@@ -1,4 +1,4 @@
-"""Agents and egos that do what they are told: whoever steps an environment moves them."""
+"""Agents and egos whose actions are set by the caller of an environment."""
 
 from __future__ import annotations
 
@@ -21,16 +21,16 @@ CONTROLS = ("acceleration", "drive")
 ACTIONS = ("effectors", "targets")
 
 
-class PuppetAgent(Agent):
-    """A tester agent that is told what to do before it chooses.
+class CommandedAgent(Agent):
+    """A tester agent whose action is set before it chooses.
 
     Args:
         actions: "effectors": throttle and steering of each body in [-1, 1]; "targets": for each
-            body one of ``agents.features.TARGETS``, to which it walks until it is told another.
-        sees_background: whether snapshots must show everybody.
+            body one of ``agents.features.TARGETS``, to which it walks until another is set.
+        sees_background: whether snapshots must contain the whole background.
 
     Attributes:
-        told: the numbers of an action, as ``spaces`` describes them.
+        told: the action that was set, as numbers (``spaces``).
     """
 
     def __init__(self, actions: str, *, sees_background: bool) -> None:
@@ -55,17 +55,17 @@ class PuppetAgent(Agent):
         )
 
 
-class PuppetEgo(Ego):
-    """An ego that is told what to do before it acts.
+class CommandedEgo(Ego):
+    """An ego whose action is set before it acts.
 
     Args:
         control: "acceleration": SUMO keeps it on its route; "drive": throttle and steering.
         max_speed: it drives no faster [m/s].
-        depart_speed: its first speed [m/s]; None for as fast as SUMO finds safe.
+        depart_speed: its first speed [m/s]; None for the largest that SUMO considers safe.
 
     Attributes:
         steers: whether it steers itself.
-        told: throttle, and steering if it steers, each in [-1, 1].
+        told: the action that was set: throttle, and steering if it steers, each in [-1, 1].
     """
 
     def __init__(

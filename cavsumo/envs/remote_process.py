@@ -1,4 +1,4 @@
-"""The process in which episodes are played for an environment elsewhere, from inside."""
+"""Episodes in a separate process, the called side: it plays them for an environment."""
 
 from __future__ import annotations
 
@@ -11,22 +11,22 @@ from typing import Any
 
 from cavsumo.batch.worker_process import divert_output
 from cavsumo.errors import CavsumoError, SimulationError
-from cavsumo.model.processes import leash
+from cavsumo.model.processes import end_with_parent
 
 
 def main(pipe_fd: int, parent: int) -> None:
     """Serve calls until the pipe closes."""
-    leash(parent)()
+    end_with_parent(parent)()
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     pipe = Connection(pipe_fd)
-    with tempfile.TemporaryFile() as log:  # what SUMO prints
+    with tempfile.TemporaryFile() as log:  # SUMO's output
         divert_output(log.fileno())
         with contextlib.suppress(EOFError, ConnectionError):
             _serve(pipe)
 
 
 def _serve(pipe: Connection) -> None:
-    """Answer each call with what it returns, or with the error that it raises."""
+    """Answer each call with its result or its error."""
     from cavsumo.envs.episodes import Episodes
 
     episodes = Episodes(*pipe.recv())

@@ -1,7 +1,8 @@
-"""Episodes in a process of their own, seen from outside: a pipe, a deadline, a fresh one after it.
+"""Episodes in a separate process, the calling side: a pipe, a deadline, a new process after an
+error.
 
-A process has one simulation, so whoever wants several side by side in one program, or wants to
-outlive a crash of SUMO, plays them here. It costs one message there and back each step.
+A process has one simulation. A program that needs several at once, or must survive a crash of SUMO,
+plays them here. It costs one message in each direction per step.
 """
 
 from __future__ import annotations
@@ -23,8 +24,8 @@ from cavsumo.model.processes import inner_environment
 from cavsumo.model.snapshot import Snapshot
 
 
-class Elsewhere:
-    """What ``Episodes`` is, in a child process that ``reset`` starts when there is none."""
+class RemoteEpisodes:
+    """``Episodes`` in a child process, which ``reset`` starts when there is none."""
 
     def __init__(self, prepared: PreparedBatch, roles: Roles) -> None:
         self._prepared, self._roles = prepared, roles
@@ -62,7 +63,7 @@ class Elsewhere:
         except _ChildGone as gone:
             self.close()
             raise SimulationError(f"{gone}; reset starts another one") from None
-        except BaseException:  # interrupted: the answer must not be taken for the next one's
+        except BaseException:  # interrupted: the answer must not be taken for that of the next call
             self.close()
             raise
         if isinstance(answer, CavsumoError):
@@ -83,7 +84,7 @@ class _Child:
         numbers = str(theirs.fileno()), str(os.getpid())
         try:
             self._process = subprocess.Popen(
-                [sys.executable, "-P", "-m", "cavsumo.envs.elsewhere_process", *numbers],
+                [sys.executable, "-P", "-m", "cavsumo.envs.remote_process", *numbers],
                 pass_fds=(theirs.fileno(),),
                 cwd=prepared.folder,
                 env=inner_environment(),
@@ -98,7 +99,7 @@ class _Child:
         self._pipe.send((prepared, roles))
 
     def call(self, method: str, *arguments: Any) -> Any:
-        """Send a call and wait for what it returned or raised."""
+        """Send a call and wait for its result or error."""
         try:
             self._pipe.send((method, arguments))
             if self._pipe.poll(self._deadline):
@@ -113,7 +114,7 @@ class _Child:
 
 
 def _end(process: subprocess.Popen[bytes], pipe: Connection, owner: int) -> None:
-    """Kill a process, which holds nothing that is missed, and reap it; not from a fork."""
+    """Kill a process, which holds no data of value, and reap it; not from a fork."""
     pipe.close()
     if os.getpid() != owner:
         return

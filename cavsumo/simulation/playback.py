@@ -1,0 +1,66 @@
+"""Playing back: an episode once more from its record, with any ego and any assertions.
+
+One way for all uses: reruns with a reference driver, replays, certificates (whose plan
+holds the record as what its agents know).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from cavsumo.agents.base import Agent
+from cavsumo.agents.recorded import Recorded
+from cavsumo.model.bodies import Action
+from cavsumo.model.departures import Demand
+from cavsumo.network.recorded_starts import start_record
+from cavsumo.simulation.loop import Episode, EpisodeLoop, Joint
+from cavsumo.simulation.setup import Setup
+
+
+def recorded(setup: Setup, episode: Episode, seed: int, departures: Demand | None) -> Recorded:
+    """The record of an episode whose actions were kept, in the setup in which it was played.
+
+    ``departures``: None for the scenario's own demand, also behind the end of the episode.
+    """
+    return Recorded(
+        seed,
+        [by_body(setup, joint) for joint in episode.actions],
+        [start_record(setup.site, start) for start in episode.starts],
+        [start_record(setup.site, start) for start in episode.waited],
+        departures,
+        tuple(dict.fromkeys(approach.type for approach in setup.site.approaches)),
+    )
+
+
+def by_body(setup: Setup, joint: Joint) -> tuple[Action, ...]:
+    """The actions of all agents in one timestep, in the order of the bodies."""
+    found = {
+        body: Action(*action)
+        for team, actions in zip(setup.teams, joint, strict=True)
+        for body, action in zip(team, actions, strict=True)
+    }
+    return tuple(found[body] for body in sorted(found))
+
+
+def playback(
+    setup: Setup, played: Recorded, *, record: bool = False, alike: Sequence[Agent] = ()
+) -> EpisodeLoop:
+    """A recorded episode, about to be played again.
+
+    Args:
+        setup: that of the record, but perhaps for the ego and the assertions.
+        record: keep every snapshot, and show everybody in it.
+        alike: agents that look at as much of the background as those that play; one for each team.
+    """
+    agents = played.agents(setup.teams)
+    for agent, other in zip(agents, alike, strict=bool(alike)):
+        agent.sees_background = other.sees_background
+    return EpisodeLoop(setup, agents, played.seed, record=record, demand=played.departures)
+
+
+def played_back(setup: Setup, played: Recorded) -> Episode:
+    """A recorded episode played again as a whole, every snapshot and action kept."""
+    loop = playback(setup, played, record=True)
+    while not loop.over:
+        loop.step()
+    return loop.finished()
