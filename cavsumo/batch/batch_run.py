@@ -119,7 +119,7 @@ class BatchRun:
     def end(self) -> None:
         """Complete the manifest."""
         self._note_outputs()
-        self.recorder.finish(self.status, self.tally.facts() | self._lessons.facts())
+        self.recorder.finish(self.status, self.tally.facts() | self._knowledge.facts())
 
     def _note_outputs(self) -> bool:
         """Record the files that the ego has written in the manifest; returns whether any is new."""

@@ -8,8 +8,8 @@ from pathlib import Path
 from typing import Any
 
 from cavsumo.batch.ended import Ended
+from cavsumo.batch.preflight import check_kept
 from cavsumo.batch.prepared import OUTPUTS
-from cavsumo.batch.replay import recorded_plan
 from cavsumo.batch.tally import Tally
 from cavsumo.errors import ResultsError
 from cavsumo.results.provenance import differences

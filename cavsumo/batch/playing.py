@@ -7,7 +7,7 @@ from concurrent.futures import Executor
 
 from cavsumo.batch.batch_run import BatchRun
 from cavsumo.batch.ended import Ended
-from cavsumo.batch.executors import Means, opened
+from cavsumo.batch.executors import opened
 from cavsumo.batch.interrupts import Interrupts
 from cavsumo.batch.manner import Manner, Means
 from cavsumo.batch.preflight import CheckedBatch

@@ -21,7 +21,7 @@ from cavsumo.batch.ended import Ended
 from cavsumo.batch.episode_runner import EpisodeRunner
 from cavsumo.batch.jobs import job
 from cavsumo.batch.prepared import prepare
-from cavsumo.batch.replay import recorded, recorded_plan
+from cavsumo.batch.replay import recorded
 from cavsumo.batch.tally import Tally
 from cavsumo.cli import main
 from cavsumo.errors import Exit, InputError

@@ -9,9 +9,11 @@ from typing import Any
 
 from cavsumo.batch import sentences
 from cavsumo.batch.ended import Ended
-from cavsumo.batch.executors import Means
+from cavsumo.batch.manner import Manner as Manner
+from cavsumo.batch.manner import Means
+from cavsumo.batch.planned import PlannedBatch, planned
 from cavsumo.batch.playing import played
-from cavsumo.batch.preflight import CheckedBatch, Manner, checked
+from cavsumo.batch.preflight import CheckedBatch, prepared_batches
 from cavsumo.batch.summary import summarise
 from cavsumo.batch.tally import found_by
 from cavsumo.egos import make_ego
@@ -26,7 +28,11 @@ def run(settings: Mapping[str, Any], output: Path, means: Means, manner: Manner)
 
 def run_study(batches: Sequence[PlannedBatch], means: Means, manner: Manner) -> int:
     """Play one batch after another; all are checked before anything is written."""
-    ended, interrupted = played(checked(parts, output, manner), means, manner, announce)
+    checked = prepared_batches(batches, manner)
+    for batch in checked:
+        if batch.replaced:
+            print(_replacement(batch), file=sys.stderr)
+    ended, interrupted = played(checked, means, manner, announce)
     status = exit_status(ended, interrupted, manner.exit_zero)
     if not manner.quiet:
         summarise(ended)
