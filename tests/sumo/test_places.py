@@ -13,7 +13,9 @@ pytestmark = pytest.mark.usefixtures("inline")
 def test_the_table_has_a_line_for_each_place_ego_and_agent(
     networks: dict[str, Path], monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    words = "--runs 1 --learn 1 --traffic 0 -j 1 --ego time-gap --agent timing --agent best-response"
+    words = (
+        "--runs 1 --learn 1 --traffic 0 -j 1 --ego time-gap --agent timing --agent best-response"
+    )
     net = str(networks["pedestrians"])
     monkeypatch.setattr("sys.argv", ["places.py", net, *words.split()])
     benchmark("places").main()
