@@ -9,17 +9,20 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, NamedTuple
 
+from pydantic import ValidationError
+
 from cavsumo.agents.casting import learners
 from cavsumo.batch.jobs import Job, job
 from cavsumo.batch.prepared import PreparedBatch, prepare
 from cavsumo.batch.trust import check_trust
 from cavsumo.batch.worker import Worker, search
-from cavsumo.errors import DivergenceError, InputError, ResultsError
+from cavsumo.errors import DivergenceError, InputError, ResultsError, shown
 from cavsumo.model.checksums import checksum
+from cavsumo.model.documents import first_problem
 from cavsumo.model.named_networks import check_network, network_file, routes_file
 from cavsumo.model.scenario import BatchPlan, Scenario
 from cavsumo.results.columns import COLUMNS
-from cavsumo.results.reading import STARTING, inside, read_manifest, read_rows
+from cavsumo.results.reading import STARTING, check_cells, inside, read_manifest, read_rows
 from cavsumo.results.rows import Outcome, Row, cell
 from cavsumo.results.traces import NOT_REPLAYED, Trace, read_trace
 
@@ -85,10 +88,17 @@ def recorded_plan(csv_file: Path) -> tuple[BatchPlan, dict[str, Any]]:
     manifest = read_manifest(csv_file)
     if manifest.get("status") == STARTING:
         raise ResultsError(f"results {str(csv_file)!r}: a batch that was killed as it started")
+    return _plan(manifest, f"manifest of {str(csv_file)!r}"), manifest
+
+
+def _plan(origin: Mapping[str, Any], name: str) -> BatchPlan:
+    """The plan in a manifest or in the head of a trace."""
     try:
-        return BatchPlan.model_validate(manifest["plan"]), manifest
-    except (KeyError, ValueError) as error:
-        raise ResultsError(f"manifest of {str(csv_file)!r}: holds no valid plan") from error
+        return BatchPlan.model_validate(origin["plan"])
+    except KeyError:
+        raise ResultsError(f"{name}: holds no valid plan") from None
+    except ValidationError as error:
+        raise ResultsError(f"{name}: holds no valid plan: {first_problem(error)}") from error
 
 
 def recorded_row(csv_file: Path, run: int) -> dict[str, str]:
@@ -96,6 +106,7 @@ def recorded_row(csv_file: Path, run: int) -> dict[str, str]:
     rows = {row.get("run"): row for row in read_rows(csv_file)}
     if str(run) not in rows:
         raise ResultsError(f"results {str(csv_file)!r}: no run {run} among {len(rows)} rows")
+    check_cells(csv_file, rows[str(run)])
     return rows[str(run)]
 
 
@@ -103,15 +114,10 @@ def recorded_alone(file: Path, allowed: Collection[str] | None = ()) -> Record:
     """The episode in a trace; raises ResultsError when it cannot be played from that alone."""
     trace, name = read_trace(file), f"trace {str(file)!r}"
     head = trace.head
-    try:
-        plan = BatchPlan.model_validate(head["plan"])
-        row = trace.row
-        int(row["run"]), int(row["seed"]), trace.shapes(), dict(head["sha256"])
-        plan.agents.index(row["agent"])
-        kept, shared = head["memory_kept"], row["reset"] == "shared"
-    except (KeyError, ValueError, TypeError) as error:
-        raise ResultsError(f"{name}: its head holds no valid plan, row and bodies") from error
-    if shared:
+    plan, row, kept = _plan(head, name), trace.row, head["memory_kept"]
+    if row["agent"] not in plan.cast:
+        raise ResultsError(f"{name}: its plan has no agent {shown(row['agent'])}")
+    if row["reset"] == "shared":
         raise ResultsError(
             f"{name}: was played in a simulation that other episodes used before; replay it from "
             "its results"

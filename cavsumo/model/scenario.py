@@ -21,8 +21,9 @@ from pydantic import (
     model_validator,
 )
 
-from cavsumo.errors import InputError, UnknownName
+from cavsumo.errors import InputError, UnknownName, shown
 from cavsumo.model.checks import densities
+from cavsumo.model.documents import first_problem
 from cavsumo.model.labels import cast_of
 from cavsumo.model.named_networks import (
     check_network,
@@ -116,8 +117,9 @@ class Scenario(BaseModel):
     @classmethod
     def _formulas_are_asserted(cls, given: Any) -> Any:
         """Formulas without a list of assertions are what is asserted."""
-        if isinstance(given, Mapping) and given.get("formulas") and "assertions" not in given:
-            return {**given, "assertions": tuple(given["formulas"])}
+        formulas = given.get("formulas") if isinstance(given, Mapping) else None
+        if formulas and isinstance(formulas, Mapping) and "assertions" not in given:
+            return {**given, "assertions": tuple(formulas)}
         return given
 
     @field_validator("step_length")
@@ -312,6 +314,9 @@ def plan_from(settings: Mapping[str, Any], source: str) -> BatchPlan:
     check_keys(settings, source)
     if "net" not in settings:
         raise InputError(f"{source}: no network given; name one with --net FILE")
+    for key in ("net", "routes"):
+        if not isinstance(settings.get(key, ""), str | Path):
+            raise InputError(f"{source}: {key}: expected a path, got {shown(settings[key])}")
     check_network(Path(settings["net"]), source)
     scenario = {k: v for k, v in settings.items() if k in SCENARIO_KEYS}
     if str(scenario.get("traffic")) == "none":
@@ -323,7 +328,7 @@ def plan_from(settings: Mapping[str, Any], source: str) -> BatchPlan:
             **{k: v for k, v in settings.items() if k in PLAN_KEYS},
         )
     except ValidationError as error:
-        raise InputError(f"{source}: {_first_problem(error)}") from error
+        raise InputError(f"{source}: {first_problem(error, 'scenario')}") from error
     for file in (plan.scenario.routes_file, *plan.scenario.additional):
         if file is not None and not file.is_file():
             raise InputError(f"{source}: no such file: {str(file)!r}")
@@ -374,12 +379,3 @@ def _route_file(scenario: Mapping[str, Any], source: str) -> Path | None:
         if file.is_file():
             return file
     return None
-
-
-def _first_problem(error: ValidationError) -> str:
-    """The first of pydantic's findings as one sentence."""
-    problem = error.errors()[0]
-    place = ".".join(str(p) for p in problem["loc"] if p not in ("scenario",))
-    message = problem["msg"].removeprefix("Value error, ")
-    given = "" if problem["type"] == "missing" else f", got {problem['input']!r}"
-    return f"{place}: {message}{given}"

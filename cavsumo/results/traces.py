@@ -16,18 +16,19 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from cavsumo.errors import ResultsError
+from cavsumo.errors import ResultsError, shown
 from cavsumo.model.bodies import Body
+from cavsumo.model.documents import json_of, read_text
 from cavsumo.model.scenario import BatchPlan
 from cavsumo.model.snapshot import BodyState, Snapshot
 from cavsumo.network.site import Site
 from cavsumo.results.columns import COLUMNS
 from cavsumo.results.provenance import EXTENT, checksums, traffic_checksum, versions
 from cavsumo.results.rows import Row, cell
+from cavsumo.results.schema import check_frame, check_head, check_row
 from cavsumo.sumo.options import OPTIONS
 
 FORMAT = "cavsumo-trace-1"
-FRAME_KEYS = {"step", "time_s", "ego", "steering", "testers", "background"}
 # Columns that a replay does not reproduce: real time, and the file beside the row.
 NOT_REPLAYED = ("wall_s", "trace")
 # Settings that say how a batch is played and kept and not what its episodes are; what is known is
@@ -150,21 +151,46 @@ def trace_text(head: Mapping[str, Any], frames: Iterable[Mapping[str, Any]]) -> 
 
 def read_trace(file: Path) -> Trace:
     """The trace in a file; raises ResultsError in one sentence."""
+    text = read_text(file, "trace", ResultsError)
     try:
-        return parsed(file.read_text(encoding="utf-8"))
-    except OSError as error:
-        raise ResultsError(f"trace {str(file)!r}: cannot be read: {error.strerror}") from error
-    except (ValueError, TypeError, AttributeError) as error:
+        return parsed(text)
+    except ValueError as error:
         raise ResultsError(f"trace {str(file)!r}: cannot be read: {error}") from error
 
 
 def parsed(text: str) -> Trace:
-    """The trace that a text holds; raises ValueError and the like when it holds none."""
-    first, *lines = text.splitlines() or [""]
-    found = json.loads(first)
+    """The trace that a text holds; raises ValueError, in plain words, when it holds none."""
+    first, *lines = _lines(text)
+    head = _head(first)
+    trace = Trace(head, [_frame(line, i) for i, line in enumerate(lines, 2)])
+    met = trace.shapes()
+    for i, found in enumerate(trace.frames, 2):
+        for _, name, _ in states(found):
+            if name not in met:
+                raise ValueError(f"line {i}: the head tells no shape of {shown(name)}")
+    return trace
+
+
+def _lines(text: str) -> list[str]:
+    """The lines of a text: those that end with a line feed, and what stands behind the last."""
+    lines = text.split("\n")
+    return lines if lines[-1] or len(lines) == 1 else lines[:-1]
+
+
+def _head(line: str) -> dict[str, Any]:
+    """The first line of a trace."""
+    try:
+        found = json_of(line)
+    except ValueError as error:
+        raise ValueError(f"line 1: {error}") from error
     if not (isinstance(found, dict) and found.get("format") == FORMAT):
         raise ValueError(f"line 1 is not the head of a {FORMAT}")
-    return Trace(found, [_frame(line) for line in lines])
+    try:
+        check_head(found)
+        check_row(found["row"])
+    except ValueError as error:
+        raise ValueError(f"line 1: {error}") from error
+    return found
 
 
 def read_moments(file: Path, times: Sequence[float]) -> list[tuple[float, dict[str, Any]]]:
@@ -173,14 +199,15 @@ def read_moments(file: Path, times: Sequence[float]) -> list[tuple[float, dict[s
     Only those frames are parsed as a whole: traces are long, and a report reads thousands.
     """
     try:
-        with file.open(encoding="utf-8") as stream:
-            lines = stream.readlines()[1:]  # the first is the head
+        lines = _lines(read_text(file, "trace", ResultsError))[1:]  # the first is the head
+        if not lines:
+            raise ValueError("no frames")
         passing = list(map(_passing, lines))
         steps = (math.dist(a[1:], b[1:]) for a, b in itertools.pairwise(passing))
         driven = list(itertools.accumulate(steps, initial=0.0))
         nearest = [min(range(len(lines)), key=lambda i: abs(passing[i][0] - t)) for t in times]
-        return [(driven[i], _frame(lines[i])) for i in nearest]
-    except (OSError, ValueError, TypeError) as error:
+        return [(driven[i], _frame(lines[i], i + 2)) for i in nearest]
+    except ValueError as error:
         raise ResultsError(f"trace {str(file)!r}: cannot be read: {error}") from error
 
 
@@ -192,16 +219,20 @@ def _passing(line: str) -> tuple[float, float, float]:
     found = _POSE.search(line)
     if found is None:
         raise ValueError("a frame without time_s and ego, one after the other")
-    time, x, y = map(float, found.groups())
+    try:
+        time, x, y = map(float, found.groups())
+    except ValueError:
+        time = x = y = math.nan
+    if not math.isfinite(time + x + y):
+        raise ValueError(f"a frame at {shown(found.groups())}, expected numbers")
     return time, x, y
 
 
-def _frame(line: str) -> dict[str, Any]:
-    """A line of a trace."""
-    found: dict[str, Any] = json.loads(line)
-    if not set(found) >= FRAME_KEYS:
-        raise ValueError(f"a frame without {', '.join(sorted(FRAME_KEYS - set(found)))}")
-    for _, name, state in states(found):
-        if len(state) != 4 or not all(isinstance(value, int | float) for value in state):
-            raise ValueError(f"step {found['step']}: {name} is {state!r}, expected [x, y, v, o]")
+def _frame(line: str, number: int) -> dict[str, Any]:
+    """A line of a trace, whose number is for messages."""
+    try:
+        found: dict[str, Any] = json_of(line, bounded=False)
+        check_frame(found)
+    except ValueError as error:
+        raise ValueError(f"line {number}: {error}") from error
     return found
