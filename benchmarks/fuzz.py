@@ -49,8 +49,8 @@ STATUSES = (0, 1, 2, 3, 130)
 PYTHON = re.compile(
     r"\b\w*(Error|Exception|Warning|StopIteration)\b|object has no|NoneType|list index"
     r"|subscriptable|unhashable|object is not|Traceback|<class|unexpected keyword|positional arg"
-    r"|recursion|set_int_max|codec can't|Errno|not iterable|unpack|int\(\)|float\(\)|not supported between"
-    r"|datetime\.|<.* at 0x|Fraction\("
+    r"|recursion|set_int_max|codec can't|Errno|not iterable|unpack|int\(\)|float\(\)"
+    r"|not supported between|datetime\.|<.* at 0x|Fraction\("
 )
 
 
