@@ -106,6 +106,7 @@ def whole_files() -> Whole:
     with tempfile.TemporaryDirectory() as name, contextlib.chdir(name):
         folder = Path()
         shutil.copy(ROOT / "networks" / "pedestrians.net.xml", "road.net.xml")
+        shutil.copy(ROOT / "networks" / "junction.net.xml", "junction.net.xml")
         shutil.copy(ROOT / "routes" / "pedestrians.rou.xml", "road.rou.xml")
         shutil.copy(ROOT / "tests" / "data" / "crossroads.osm", "cross.osm")
         _play(folder / "found.csv")
@@ -213,6 +214,14 @@ def strategies(whole: Whole) -> dict[str, st.SearchStrategy[Case]]:
             "run -n road.net.xml -r none -q",
             "run -n road.net.xml -r road.rou.xml --jaywalk --ego-route eastbound -q",
             "run -n road.net.xml --traffic 4 --kind car --agent random -q",
+        ),
+        "junction": case(
+            "junction.net.xml",
+            xmls(whole.text("junction.net.xml")),
+            "inspect junction.net.xml",
+            "run -n junction.net.xml -r none -q --ego-route left",
+            "run -n junction.net.xml -r none -q --signal red",
+            "run -n junction.net.xml --traffic 4 --kind car --agent random -q",
         ),
         "routes": case(
             "road.rou.xml", xmls(whole.text("road.rou.xml")), "run -n road.net.xml -r road.rou.xml"

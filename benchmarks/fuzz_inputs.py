@@ -227,7 +227,8 @@ def _xml(draw: Any, whole: str, focus: Callable[[Any], bool]) -> str:
     elements = [element for element in root.iter() if focus(element)]
     values = sorted({v for e in elements[:40] for v in e.attrib.values()})[:40]
     for _ in range(draw(st.integers(1, 3))):
-        element = draw(st.sampled_from(elements))
+        tag = draw(st.sampled_from(sorted({element.tag for element in elements})))
+        element = draw(st.sampled_from([e for e in elements if e.tag == tag]))
         keys = sorted(element.attrib)
         match draw(st.integers(0, 9)):
             case 0 if element in parents and element in list(parents[element]):

@@ -6,22 +6,18 @@ no side of the road is taken for granted.
 
 from __future__ import annotations
 
-import gzip
 import html
-import xml.sax
-import zlib
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path as FilePath
 from typing import Any
-from xml.etree import ElementTree
 
 import shapely
-import sumolib
 from shapely.geometry import LineString, Polygon
 
 from cavsumo.errors import NetworkError, UnknownName
 from cavsumo.model.carriageway import Roads
 from cavsumo.model.polyline import Path, Point
+from cavsumo.network.net_file import read_net
 
 # Junction interiors leave slivers between the lanes that cross them; closing by this much [m]
 # makes the carriageway one surface without reaching over a kerb.
@@ -144,23 +140,7 @@ def read_network(file: FilePath, *, foes: bool = False) -> Network:
         raise NetworkError(f"network {str(file)!r}: is a folder, expected a .net.xml")
     if not file.is_file():
         raise NetworkError(f"network {str(file)!r}: no such file{_neighbours(file)}")
-    root = _root(file)
-    try:
-        net = sumolib.net.readNet(
-            str(file),
-            withInternal=True,
-            withPedestrianConnections=True,
-            withPrograms=True,
-            withFoes=foes,
-            lxml=False,
-        )
-    except (xml.sax.SAXParseException, EOFError, zlib.error) as error:
-        raise NetworkError(
-            f"network {str(file)!r}: not well-formed XML: {_one_line(error)}"
-        ) from error
-    except (xml.sax.SAXException, LookupError, ValueError, TypeError, AttributeError, OSError) as e:
-        raise NetworkError(f"network {str(file)!r}: cannot be read: {_one_line(e)}") from e
-    network = Network(file, net, root)
+    network = Network(file, *read_net(file, foes=foes))
     if not any(driving_lanes(edge) for edge in network.edges):
         raise NetworkError(f"network {str(file)!r}: holds no lane on which a car may drive")
     return network
@@ -238,29 +218,9 @@ def interior(network: Network, link: Any) -> list[Any]:
     return lanes
 
 
-def _root(file: FilePath) -> dict[str, str]:
-    """The attributes of a network's <net>; refuses what is not XML, or other XML."""
-    opener = gzip.open if file.suffix == ".gz" else open
-    try:
-        with opener(file, "rb") as stream:
-            _, root = next(ElementTree.iterparse(stream, events=("start",)))
-    except (ElementTree.ParseError, OSError, EOFError, zlib.error) as error:
-        raise NetworkError(f"network {str(file)!r}: not well-formed XML: {error}") from error
-    if root.tag != "net":
-        raise NetworkError(
-            f"network {str(file)!r}: a SUMO network begins with <net>, this file with <{root.tag}>"
-        )
-    return dict(root.attrib)
-
-
 def _neighbours(file: FilePath) -> str:
     """Names the networks that lie where the missing one was looked for."""
     if not file.parent.is_dir():
         return ""
     found = sorted(p.name for p in file.parent.glob("*.net.xml*"))
     return f"; {str(file.parent)!r} holds {', '.join(found[:6])}" if found else ""
-
-
-def _one_line(error: BaseException) -> str:
-    """An exception as one line."""
-    return " ".join(f"{type(error).__name__}: {error}".split())
