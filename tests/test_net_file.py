@@ -48,6 +48,7 @@ def replaced(networks: dict[str, Path], folder: Path, old: str, new: str) -> Pat
         ('speed="13.890"', 'speed="fast"', "<lane> has speed='fast', expected a number of at"),
         ('length="99.000"', 'length="-1"', "<lane> has length='-1', expected a number of at least"),
         ('width="3.000"', 'width=""', "<lane> has width='', expected a number"),
+        ("<edge ", '<edge function="x" ', "expected one of internal, crossing, walkingarea, conn"),
         ('priority="-1"', 'priority="!"', "<edge> has priority='!', expected a whole number"),
         ('edge id="eastbound" ', "edge ", "<edge> has no id, expected a name"),
         ('from="west"', 'from="wst"', "<edge id='eastbound'>: there is no junction 'wst'"),
@@ -95,13 +96,16 @@ ENDS = 'from="eastbound" to="westbound" fromLane="1" toLane="1"'
         (f'{ENDS} via="a"', "there is no lane 'a' of edge ''"),
         (f'{ENDS} tl="light"', "has a tl and no linkIndex of at least 0"),
         (f'{ENDS} tl="light" linkIndex="-1"', "has a tl and no linkIndex of at least 0"),
+        (f'{ENDS} tl="light" linkIndex="2"', "linkIndex=2, and light 'light' has a state of 2 let"),
     ],
 )
 def test_a_connection_of_what_is_not_there_is_named(
     networks: dict[str, Path], tmp_path: Path, rest: str, words: str
 ) -> None:
     """Lanes by their numbers, lanes inside junctions, traffic lights."""
-    file = replaced(networks, tmp_path, "</net>", connection(rest))
+    light = '<tlLogic id="light" type="static" programID="0" offset="0">'
+    light += '<phase duration="9" state="Gr"/></tlLogic>'
+    file = replaced(networks, tmp_path, "</net>", light + connection(rest))
     with pytest.raises(NetworkError) as error:
         read_network(file)
     assert words in str(error.value)

@@ -19,9 +19,8 @@ from xml.sax.handler import ContentHandler
 import sumolib
 
 from cavsumo.errors import NetworkError, shown
-from cavsumo.network.net_format import ELEMENTS, INDEX, PARENTS
+from cavsumo.network.net_format import ELEMENTS, INDEX, INSIDE, LEFT_OUT, PARENTS
 
-INSIDE = ("internal", "crossing", "walkingarea")  # functions of the edges inside junctions
 HOLDERS = ("lane", "edge", "junction", "connection", "tlLogic")  # whose <param> sumolib takes
 
 
@@ -80,6 +79,9 @@ class _Reader(ContentHandler):
         self._edge = ""  # the one under way
         self._junctions: set[str] = set()
         self._onward: dict[str, str] = {}  # lanes inside junctions, with the next one inside
+        self._light = ""  # whose program is under way
+        self._letters: dict[str, int] = {}  # traffic lights, with the shortest state of theirs
+        self._signals: list[tuple[int, str, str, int]] = []  # line, who, its light, its index there
         # What is referred to before it may have come: line, who refers, what, its name.
         self._wanted: list[tuple[int, str, str, str]] = []
 
@@ -150,12 +152,17 @@ class _Reader(ContentHandler):
             self._junctions.add(given["id"])
         elif name == "connection":
             self._note_connection(given)
+        elif name == "tlLogic":
+            self._light = given["id"]
+        elif name == "phase":
+            letters = len(given["state"])
+            self._letters[self._light] = min(letters, self._letters.get(self._light, letters))
 
     def _note_edge(self, given: Mapping[str, str]) -> None:
         """An edge, with the junctions that it leads from and to, and the edges that it crosses."""
         edge, function = given["id"], given.get("function", "")
         who = f"<edge id={shown(edge)}>"
-        if function not in ("", *INSIDE):
+        if function in LEFT_OUT:
             self._skipped.add(edge)
             return
         if edge in self._edges:
@@ -182,8 +189,10 @@ class _Reader(ContentHandler):
         who = f"<connection from={shown(ends[0])} to={shown(ends[1])}>"
         for edge, key in zip(ends, ("fromLane", "toLane"), strict=True):
             self._check_lane(who, edge, given[key])
-        if given.get("tl") and not INDEX.fits(given.get("linkIndex", "")):
-            raise self._wrong(f"{who} has a tl and no linkIndex of at least 0")
+        if given.get("tl"):
+            if not INDEX.fits(given.get("linkIndex", "")):
+                raise self._wrong(f"{who} has a tl and no linkIndex of at least 0")
+            self._signals.append((self._line(), who, given["tl"], int(given["linkIndex"])))
         via = given.get("via", "")
         if via:
             self._check_lane(who, *via.rpartition("_")[::2])
@@ -201,6 +210,11 @@ class _Reader(ContentHandler):
         for line, who, what, name in self._wanted:
             if name not in there[what]:
                 raise self._wrong(f"{who}: there is no {what} {shown(name)}", line)
+        for line, who, light, index in self._signals:
+            letters = self._letters.get(light, index + 1)
+            if index >= letters:
+                shortest = f"light {shown(light)} has a state of {letters} letters"
+                raise self._wrong(f"{who} has linkIndex={index}, and {shortest}", line)
         for start in self._onward:
             lane, seen = start, set[str]()
             while lane in self._onward and lane not in seen:

@@ -11,6 +11,11 @@ _NUMBER = re.compile(r"[-+]?(\d+\.?\d*|\.\d+)([eE][-+]?\d{1,3})?", re.ASCII)
 _WHOLE = re.compile(r"[-+]?\d{1,9}", re.ASCII)
 
 
+INSIDE = ("internal", "crossing", "walkingarea")  # functions of the edges inside junctions
+LEFT_OUT = ("connector",)  # of those that sumolib does not read
+FUNCTIONS = ("", *INSIDE, *LEFT_OUT)
+
+
 class Kind(NamedTuple):
     """A kind of attribute: whether a text is one, and what is expected, in words."""
 
@@ -48,6 +53,7 @@ WHOLE = Kind(lambda text: _WHOLE.fullmatch(text.strip()) is not None, "a whole n
 INDEX = Kind(lambda text: WHOLE.fits(text) and int(text) >= 0, "a whole number of at least 0")
 SHAPE = Kind(_is_shape, "points x,y with blanks between")
 LINE = Kind(_is_line, "two points x,y or more, with blanks between")
+FUNCTION = Kind(lambda text: text in FUNCTIONS, "one of " + ", ".join(filter(None, FUNCTIONS)))
 BITS = Kind(lambda text: re.fullmatch("[01]+", text) is not None, "zeros and ones")
 STEPS = Kind(lambda text: all(map(WHOLE.fits, text.split())), "whole numbers")
 VERSION = Kind(
@@ -69,7 +75,7 @@ ELEMENTS: Mapping[str, tuple[Attributes, Attributes]] = {
         {},
     ),
     "type": ({"id": NAME}, {}),
-    "edge": ({"id": NAME}, {"priority": WHOLE, "shape": SHAPE}),
+    "edge": ({"id": NAME}, {"function": FUNCTION, "priority": WHOLE, "shape": SHAPE}),
     "lane": (
         {"speed": SIZE, "length": SIZE, "shape": LINE},
         {"width": NUMBER},
