@@ -28,7 +28,6 @@ from typing import Any, ClassVar, NamedTuple
 
 import libsumo
 
-from cavsumo.agents.casting import make_agents
 from cavsumo.assertions.base import ASSERTIONS, Assertion
 from cavsumo.assertions.contacts import Contact
 from cavsumo.batch.episode_runner import EpisodeRunner
@@ -290,10 +289,10 @@ def serve(pipe: Connection, setup: Setup, first: int, count: int) -> None:
         },
         "benchmark",
     )
-    with EpisodeRunner(plan, prepare(plan).site) as runner:
+    with EpisodeRunner(prepare(plan)) as runner:
         watch = runner.setup.assertions[0]
         assert isinstance(watch, Watch)
-        agents = make_agents(plan, setup.agent)
+        agents = runner.prepared.cast.agents(setup.agent)
         for run in range(first, count):
             play(runner.setup, agents, job(plan, run).seed)
             pipe.send(watch.sightings)

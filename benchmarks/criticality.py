@@ -43,7 +43,7 @@ def main() -> None:
         net = NETWORKS / f"{network}.net.xml"
         settings = {"net": net, "runs": episodes, "trace": "none", "reference": "none"}
         plan = plan_from(settings, "benchmark")
-        with EpisodeRunner(plan, prepare(plan).site) as runner:
+        with EpisodeRunner(prepare(plan)) as runner:
             runner.play(job(plan, 0))
             spent.clear()
             begun = time.process_time()

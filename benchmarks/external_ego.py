@@ -23,7 +23,6 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
-from cavsumo.agents.casting import make_agents
 from cavsumo.batch.prepared import prepare
 from cavsumo.egos import Acceleration, Ego, make_ego
 from cavsumo.egos.external.protocol import Observations, hello
@@ -86,9 +85,11 @@ def main() -> None:
     parser.add_argument("--episodes", type=int, default=10)
     options = parser.parse_args()
     plan = plan_from({"net": options.net, "trace": "none"}, "external")
-    site = prepare(plan).site
+    prepared = prepare(plan)
     with forms() as egos:
-        stages = {name: make_setup(plan.scenario, site, Timed(ego)) for name, ego in egos.items()}
+        stages = {
+            name: make_setup(plan.scenario, prepared.site, Timed(ego)) for name, ego in egos.items()
+        }
         for setup in stages.values():
             setup.ego.prepare(setup.mission)
         spent: dict[str, list[float]] = {name: [] for name in stages}
@@ -97,7 +98,7 @@ def main() -> None:
             seed, found = episode_seed(plan.seed, i), set()
             for name, setup in stages.items():
                 begun = time.perf_counter()
-                episode = play(setup, make_agents(plan, "timing"), seed)
+                episode = play(setup, prepared.cast.agents("timing"), seed)
                 spent[name].append((time.perf_counter() - begun) / episode.steps)
                 found.add((episode.judgement, episode.steps, episode.contacts.min_gap))
             assert len(found) == 1, f"episode {i} differs: {found}"

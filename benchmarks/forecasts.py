@@ -19,7 +19,8 @@ from cavsumo.batch.executors import local_executor
 from cavsumo.batch.prepared import PreparedBatch, prepare
 from cavsumo.batch.summary import interval, percent
 from cavsumo.model.scenario import plan_from
-from cavsumo.results.rows import Row, is_test
+from cavsumo.results.columns import Row
+from cavsumo.results.rows import is_test
 from cavsumo.results.statistics import rate
 
 

@@ -74,10 +74,10 @@ def _play(csv_file: Path) -> None:
     """Three episodes of an ego that keeps its speed."""
     given = {"net": "road.net.xml", "routes": "none", "ego": "constant", "runs": 3, "end": 8.0}
     prepared = prepare(plan_from(given | {"trace": "all", "testers": 2, "seed": 3}, "fuzz"))
-    with EpisodeRunner(prepared.plan, prepared.site) as runner, Recorder(csv_file) as recorder:
+    with EpisodeRunner(prepared) as runner, Recorder(csv_file) as recorder:
         recorder.begin(manifest(prepared))
         for run in range(3):
-            recorder.write(runner.play(job(prepared.plan, run))[0])
+            recorder.write(runner.play(job(prepared.plan, run)).outcome)
         recorder.finish("finished", {"episodes": 3, "counts": {}})
 
 

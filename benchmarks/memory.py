@@ -21,9 +21,11 @@ from typing import Any
 from chaos import children
 
 from cavsumo.batch.batch_run import BatchRun
-from cavsumo.batch.jobs import head
+from cavsumo.batch.jobs import finished
+from cavsumo.batch.messages import Answer
 from cavsumo.batch.prepared import manifest, prepare
 from cavsumo.model.scenario import plan_from
+from cavsumo.results.columns import row_of
 from cavsumo.results.rows import Outcome
 from cavsumo.results.writing import Recorder
 
@@ -36,7 +38,8 @@ class Stubs(Executor):
     def submit(self, _: Any, prepared: Any, jobs: Any) -> Future[Any]:  # type: ignore[override]
         future: Future[Any] = Future()
         made = {"outcome": "held", "trigger_time_s": 1.0 + jobs[0].run % 97 / 10, "wall_s": 0.0}
-        future.set_result([(Outcome(head(prepared.plan, job) | made), None) for job in jobs])
+        rows = [row_of(finished(prepared.plan, job)) | made for job in jobs]
+        future.set_result([Answer(Outcome(row)) for row in rows])
         return future
 
 

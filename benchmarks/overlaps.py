@@ -85,11 +85,11 @@ def surface(net: Path) -> shapely.Geometry:
 def line(plan: BatchPlan, ground: shapely.Geometry) -> str:
     """The figures of a batch."""
     counts, frames, off = Counter[str](), 0, 0
-    with EpisodeRunner(plan, prepare(plan).site) as runner:
+    with EpisodeRunner(prepare(plan)) as runner:
         for run in range(plan.runs):
             one = job(plan, run)
             try:
-                episode = loop.play(runner.setup, runner._cast(one), one.seed, record=True)
+                episode = loop.play(runner.setup, runner.agents_of(one), one.seed, record=True)
             except CavsumoError as error:
                 counts["errors"] += 1
                 print(f"run {run}: {error}")

@@ -44,7 +44,7 @@ def main() -> None:
         given | {"trace": "none", "ego_params": ego, "runs": options.blocks * SHARED_BY}, "shared"
     )
     spent, steps, found, confirmed = Counter[str](), Counter[str](), 0, 0
-    with EpisodeRunner(plan, prepare(plan).site) as runner:
+    with EpisodeRunner(prepare(plan)) as runner:
         for block in range(options.blocks):
             jobs = [job(plan, block * SHARED_BY + i) for i in range(SHARED_BY)]
             bare(runner, jobs, spent, steps)
@@ -78,7 +78,7 @@ def report(name: str, seconds: float, bare: float, episodes: int, steps: Counter
 def bare(runner: EpisodeRunner, jobs: list[Job], spent: Counter[str], steps: Counter[str]) -> None:
     """The bare loop along the tracks of the fresh episodes."""
     for one in jobs:
-        frames = loop.play(runner.setup, runner._cast(one), one.seed, record=True).frames
+        frames = loop.play(runner.setup, runner.agents_of(one), one.seed, record=True).frames
         tracks = [[to_bare(t) for t in s.testers] for s in frames]
         begun = time.perf_counter()
         bare_loop(runner.setup.world, one.seed, tracks)
@@ -91,7 +91,7 @@ def play(
 ) -> list[bool]:
     """Play jobs; which of them were tests."""
     begun = time.perf_counter()
-    rows = [runner.play(one)[0].row for one in jobs]
+    rows = [runner.play(one).outcome.row for one in jobs]
     spent[name] += time.perf_counter() - begun  # type: ignore[assignment]
     steps[name] += sum(row["steps"] for row in rows)
     return [is_test(row) for row in rows]

@@ -57,7 +57,7 @@ def main() -> None:
             demand = plan_from(given, "benchmark").scenario.routes
             given["routes"] = str(wanderers(options.net, demand, options.cars, Path(folder)))
         plan = plan_from(given, "benchmark")
-        with EpisodeRunner(plan, prepare(plan).site) as runner:
+        with EpisodeRunner(prepare(plan)) as runner:
             spent = compare(runner, options.episodes)
             shares = parts(runner, options.episodes)
     print(
@@ -133,7 +133,7 @@ def compare(runner: EpisodeRunner, episodes: int) -> Spent:
     world = runner.setup.world
     for run in range(episodes):
         one = job(runner.plan, run)
-        agents = runner._cast(one)
+        agents = runner.agents_of(one)
         recorded = loop.play(runner.setup, agents, one.seed, record=True).frames
         tracks = [[to_bare(t) for t in s.testers] for s in recorded]
         spent.present += [len(s.raw_background) for s in recorded]
@@ -253,7 +253,7 @@ def parts(runner: EpisodeRunner, episodes: int) -> list[tuple[str, float]]:
     begun = time.perf_counter()
     for run in range(episodes):
         one = job(runner.plan, run)
-        agents = runner._cast(one)
+        agents = runner.agents_of(one)
         for agent in agents:
             agent.choose_action = clocked("agents", type(agent).choose_action.__get__(agent))  # type: ignore[method-assign]
         loop.play(setup, agents, one.seed)

@@ -1,16 +1,57 @@
 """cavsumo: generates tests for autonomous vehicles in SUMO.
 
-The rooms, in the order in which they may use each other, are listed in ``docs/architecture.md``.
-Nothing of them is imported here, so that ``import cavsumo`` costs nothing.
+``cavsumo.run`` and the other public names are described in ``docs/python.md``; the rooms, in the
+order in which they may use each other, in ``docs/architecture.md``. Nothing of them is imported
+before it is used, so that ``import cavsumo`` costs nothing.
 """
+
+from __future__ import annotations
 
 import sys
 from importlib import import_module
 from importlib.abc import Loader, MetaPathFinder
 from importlib.machinery import ModuleSpec
 from types import ModuleType
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from cavsumo.agents.base import Agent as Agent
+    from cavsumo.api.episodes import RecordedEpisode as RecordedEpisode
+    from cavsumo.api.results import Results as Results
+    from cavsumo.api.results import load as load
+    from cavsumo.api.running import run as run
+    from cavsumo.assertions.base import Assertion as Assertion
+    from cavsumo.assertions.base import Judgement as Judgement
+    from cavsumo.egos.base import Acceleration as Acceleration
+    from cavsumo.egos.base import Drive as Drive
+    from cavsumo.egos.base import Ego as Ego
+    from cavsumo.errors import CavsumoError as CavsumoError
+    from cavsumo.errors import DivergenceError as DivergenceError
+    from cavsumo.errors import InputError as InputError
+    from cavsumo.model.bodies import Action as Action
+    from cavsumo.model.scenario import Scenario as Scenario
 
 __version__ = "0.1.0"
+
+# The public names, by the modules in which they stand.
+_PUBLIC = {
+    "run": "api.running",
+    "load": "api.results",
+    "Results": "api.results",
+    "RecordedEpisode": "api.episodes",
+    "Scenario": "model.scenario",
+    "Agent": "agents.base",
+    "Action": "model.bodies",
+    "Ego": "egos.base",
+    "Acceleration": "egos.base",
+    "Drive": "egos.base",
+    "Assertion": "assertions.base",
+    "Judgement": "assertions.base",
+    "CavsumoError": "errors",
+    "InputError": "errors",
+    "DivergenceError": "errors",
+}
+__all__ = [*_PUBLIC]
 
 # Modules that version 0.1 had at the root and that users import, by where they stand now.
 _MOVED = {
@@ -58,3 +99,17 @@ class _MovedModules(MetaPathFinder, Loader):
 
 if not any(type(finder).__name__ == _MovedModules.__name__ for finder in sys.meta_path):
     sys.meta_path.insert(0, _MovedModules())
+
+
+def __getattr__(name: str) -> Any:
+    """A public name, loaded when it is first used (PEP 562)."""
+    if name not in _PUBLIC:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    found = getattr(import_module(f"{__name__}.{_PUBLIC[name]}"), name)
+    globals()[name] = found
+    return found
+
+
+def __dir__() -> list[str]:
+    """The names that there are, loaded or not."""
+    return sorted({*globals(), *__all__})

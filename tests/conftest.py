@@ -11,8 +11,9 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from inline import played_here
 from shapely.geometry import LineString, box
-from support import CHROMIUM, LAPTOP, OPTIONS
+from support import CHROMIUM, LAPTOP, OPTIONS, ROOT, prepared_at
 
 from cavsumo.agents.base import Scene
 from cavsumo.batch.episode_runner import EpisodeRunner
@@ -28,11 +29,9 @@ from cavsumo.model.polyline import Path as Polyline
 from cavsumo.model.scenario import BatchPlan, plan_from
 from cavsumo.model.snapshot import BodyState, Snapshot
 from cavsumo.network.site import Site
-from cavsumo.results.provenance import checksums, versions
 from cavsumo.results.traces import Trace, parsed
 from cavsumo.sumo.world import World
 
-ROOT = Path(__file__).parents[1]
 NAMES = ("crossing", "junction", "pedestrians")
 
 # The straight road of networks/pedestrians.net.xml, in metres.
@@ -48,6 +47,20 @@ def _own_cache(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
     with pytest.MonkeyPatch.context() as patched:
         patched.setenv("XDG_CACHE_HOME", str(tmp_path_factory.mktemp("cache")))
         yield
+
+
+@pytest.fixture(scope="module")
+def inline() -> Iterator[None]:
+    """Batches are played in this process."""
+    with played_here():
+        yield
+
+
+@pytest.fixture(scope="module", autouse=True)
+def _no_workers(request: pytest.FixtureRequest) -> None:
+    """Real workers play in tests/process only."""
+    if request.path.parent.name != "process":
+        request.getfixturevalue("inline")
 
 
 @pytest.fixture(scope="session")
@@ -92,8 +105,7 @@ def set_up(staged: Callable[..., tuple[BatchPlan, Site]]) -> Callable[..., Prepa
     """Call like ``staged`` for all that a process needs to play."""
 
     def made(name: str = "pedestrians", **settings: Any) -> PreparedBatch:
-        plan, site = staged(name, **settings)
-        return PreparedBatch(plan, site, str(Path.cwd()), checksums(plan), versions())
+        return prepared_at(*staged(name, **settings))
 
     return made
 
@@ -235,8 +247,8 @@ def _start(x: float, y: float, o: float, open_plane: bool) -> Start:
 def shown(staged: Callable[..., tuple[BatchPlan, Site]]) -> tuple[Record, Trace, Site]:
     """An episode at the Helsinki crossing in which the ego hits a tester, recorded."""
     plan, site = staged("crossing", agents=["timing"], routes="auto")
-    with EpisodeRunner(plan, site) as runner:
-        outcome, _ = runner.play(dataclasses.replace(job(plan, 1), record=True))
+    with EpisodeRunner(prepared_at(plan, site)) as runner:
+        outcome = runner.play(dataclasses.replace(job(plan, 1), record=True)).outcome
     trace = parsed(outcome.trace)
     return Record(plan, trace.row, trace, trace.head, Path("results.csv")), trace, site
 
@@ -286,7 +298,6 @@ def found_failure(networks: dict[str, Path], tmp_path_factory: pytest.TempPathFa
     """The results of a small batch at the Helsinki crossing, with tests and failures."""
     file = tmp_path_factory.mktemp("found") / "found.csv"
     words = ["run", "-n", str(networks["crossing"]), "-o", str(file), "-q", "--exit-zero"]
-    assert (
-        main([*words, "--agent", "proximity", "--agent", "timing", "--runs", "8", "-j", "2"]) == 0
-    )
+    with played_here():
+        assert main([*words, "--agent", "proximity", "--agent", "timing", "--runs", "8"]) == 0
     return file

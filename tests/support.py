@@ -13,9 +13,15 @@ from concurrent.futures import Executor, Future
 from pathlib import Path
 from typing import Any
 
+from cavsumo.agents.casting import resolve_cast
 from cavsumo.batch.prepared import PreparedBatch
-from cavsumo.results.reading import read_rows
+from cavsumo.model.scenario import BatchPlan
+from cavsumo.network.site import Site
+from cavsumo.results.provenance import checksums, versions
+from cavsumo.results.reading import read_manifest, read_rows
 
+ROOT = Path(__file__).parents[1]  # the repository
+DATA = ROOT / "tests" / "data"
 PATIENCE_S = 60.0
 CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser")
 OPTIONS = (
@@ -24,13 +30,20 @@ OPTIONS = (
 ).split()
 LAPTOP, PHONE = {"width": 1280, "height": 800}, {"width": 390, "height": 844}
 # Settings of a short environment on the straight road.
-STRAIGHT_NET = str(Path(__file__).parents[1] / "networks" / "pedestrians.net.xml")
+STRAIGHT_NET = str(ROOT / "networks" / "pedestrians.net.xml")
 SHORT = {"net": STRAIGHT_NET, "routes": "none", "end": 6.0}
+
+
+def prepared_at(plan: BatchPlan, site: Site) -> PreparedBatch:
+    """All that a process needs to play a plan at a site that is known."""
+    cast = resolve_cast(plan)
+    inputs = checksums(plan.scenario, cast.files)
+    return PreparedBatch(plan, cast, site, str(Path.cwd()), inputs, versions())
 
 
 def benchmark(name: str) -> Any:
     """A module of benchmarks/, which is no package."""
-    file = Path(__file__).parents[1] / "benchmarks" / f"{name}.py"
+    file = ROOT / "benchmarks" / f"{name}.py"
     spec = importlib.util.spec_from_file_location(name, file)
     assert spec is not None
     assert spec.loader is not None
@@ -53,6 +66,19 @@ def content(folder: Path) -> dict[str, bytes]:
     """Every file of a folder with its bytes."""
     files = (file for file in folder.rglob("*") if file.is_file())
     return {str(file.relative_to(folder)): file.read_bytes() for file in files}
+
+
+def assert_same(file: Path, other: Path) -> None:
+    """Rows, traces and what was learned are those of another batch."""
+    assert rows(file) == rows(other)
+    assert traces(file) == traces(other)
+    for key in ("status", "episodes", "counts", "learned", "learned_after", "stopped_by"):
+        assert read_manifest(file)[key] == read_manifest(other)[key], key
+
+
+def untold(found: list[dict[str, str]]) -> list[dict[str, str]]:
+    """Rows without the names of their traces, which hold that of the results."""
+    return [row | {"trace": row["trace"].rpartition("/")[2]} for row in found]
 
 
 def until(happened: Callable[[], Any], what: str) -> None:

@@ -7,6 +7,7 @@ from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 
+from cavsumo.agents.names import AGENT_NAMES
 from cavsumo.model.bodies import NOOP, Action, Kind
 from cavsumo.model.registry import Registry
 from cavsumo.model.scene import Scene
@@ -41,15 +42,20 @@ class Agent:
             from its bodies. Set False where it does not: when nobody in an episode does, bodies
             that are far from everybody are left out of the snapshots.
         drives: whether its bodies may be vehicles. Set False where it can only walk.
+        learns: whether episodes change what it knows: then they are played in sequence.
+        promise: against whom its forecasts hold; empty for agents that make none.
+        manoeuvre: the one manoeuvre that its vehicles are asked to do (``manoeuvres.MANOEUVRES``):
+            they start where it is possible; "auto" for whichever is possible where they start.
         FILES: its parameters that name files; their checksums are noted with the results.
     """
 
     PARAMETERS: ClassVar[Mapping[str, str]] = {}
     FILES: ClassVar[tuple[str, ...]] = ()
-    learns: bool = False  # whether episodes change what it knows: then they are played in sequence
+    learns: bool = False
     sees_background: bool = True
     drives: bool = True
-    promise: str = ""  # against whom its forecasts hold; empty for agents that make none
+    promise: str = ""
+    manoeuvre: str = "auto"
 
     scene: Scene
     owned: tuple[int, ...]
@@ -109,7 +115,7 @@ class Agent:
         """Let the agents of one episode know of each other; called after their resets."""
 
 
-AGENTS: Registry[Agent] = Registry("agent")
+AGENTS: Registry[Agent] = Registry(AGENT_NAMES)
 
 
 @AGENTS.register("noop")

@@ -1,44 +1,141 @@
-"""Which agents play in a batch: built from their names and parameters, with the bodies they own."""
+"""The cast of a batch: which agents play, resolved once from their names and parameters.
+
+Each agent of a plan is built once for its facts; they travel with the batch as one record, from
+which the agents are built where they play.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from dataclasses import dataclass
 from pathlib import Path
 
-from cavsumo.agents import AGENTS, Agent
+from cavsumo.agents.base import AGENTS, Agent
 from cavsumo.agents.policy import make_agent, parameters_of, policy_file
 from cavsumo.errors import InputError, UnknownName
 from cavsumo.model.bodies import Body, kind_named, model_of
-from cavsumo.model.scenario import BatchPlan, Scenario
+from cavsumo.model.objects import is_here, is_object
+from cavsumo.model.plugins import source_file
+from cavsumo.model.scenario import BatchPlan, Params, Scenario
 
 
-def make_agents(plan: BatchPlan, label: str) -> list[Agent]:
-    """The agents of one label, one for each team."""
-    name = plan.cast[label]
-    params = plan.agent_params(label, [p.name for p in parameters_of(name)])
-    return [make_agent(name, params) for _ in teams(plan.scenario)]
+@dataclass(frozen=True)
+class CastMember:
+    """One agent of a batch.
+
+    Attributes:
+        label: what the plan and the rows call it.
+        name: registered name, ``policy:FILE``, or the name of an object.
+        params: its parameters, as given.
+        files: what it is made of: the file of a policy or of an object's class, and the files that
+            its parameters name.
+        learns: whether its episodes change what it knows for the next.
+        drives, promise, manoeuvre: as the agent declares them (``Agent``).
+    """
+
+    label: str
+    name: str
+    params: Params
+    files: tuple[Path, ...]
+    learns: bool
+    drives: bool
+    promise: str
+    manoeuvre: str
+
+    def make(self) -> Agent:
+        """The agent itself, new."""
+        return make_agent(self.name, self.params)
 
 
-def agent_files(plan: BatchPlan) -> list[Path]:
-    """The files of the agents: those that are policies, and those that their parameters name."""
-    files = []
+@dataclass(frozen=True)
+class Cast:
+    """The agents of a batch.
+
+    Attributes:
+        members: in the order in which they take turns.
+        agents_each: how many agents of a member play in an episode, one for each team.
+    """
+
+    members: tuple[CastMember, ...]
+    agents_each: int
+
+    def __iter__(self) -> Iterator[CastMember]:
+        return iter(self.members)
+
+    def __getitem__(self, label: str) -> CastMember:
+        """The member of a label; KeyError for none."""
+        for member in self.members:
+            if member.label == label:
+                return member
+        raise KeyError(label)
+
+    @property
+    def learners(self) -> frozenset[str]:
+        """The labels of the agents that learn from episode to episode."""
+        return frozenset(member.label for member in self.members if member.learns)
+
+    @property
+    def files(self) -> list[Path]:
+        """The files of all agents."""
+        return [file for member in self.members for file in member.files]
+
+    def agents(self, label: str) -> list[Agent]:
+        """New agents of one label, one for each team."""
+        member = self[label]
+        return [member.make() for _ in range(self.agents_each)]
+
+
+def resolve_cast(plan: BatchPlan) -> Cast:
+    """Build every agent once and account for every parameter; raises InputError."""
+    _check_parameters(plan)
+    kind, each = kind_named(plan.scenario.kind), plan.scenario.bodies_per_agent
+    members = []
     for label, name in plan.cast.items():
-        if (file := policy_file(name)) is not None:
-            files.append(file)
-            continue
-        params = plan.agent_params(label, [p.name for p in parameters_of(name)])
-        files += [
-            Path(str(params[key]))
-            for key in getattr(AGENTS.get(name), "FILES", ())
-            if key in params
-        ]
-    return files
+        if label != name and label in AGENTS:
+            raise InputError(f"agent {label}={name}: the label is the name of another agent")
+        agent = make_agent(name, params_of(plan, label))
+        try:
+            agent.check_bodies(kind, each)
+        except ValueError as error:
+            raise InputError(f"agent {label}: {error}") from error
+        members.append(_member(plan, label, agent))
+    return Cast(tuple(members), len(teams(plan.scenario)))
 
 
-def learners(plan: BatchPlan) -> frozenset[str]:
-    """The labels of the agents that learn from episode to episode."""
-    if plan.known is not None:
-        return frozenset()
-    return frozenset(n for n in plan.cast if any(a.learns for a in make_agents(plan, n)))
+def _member(plan: BatchPlan, label: str, agent: Agent) -> CastMember:
+    """An agent of a plan with the facts that one of it declares."""
+    name, params = plan.cast[label], params_of(plan, label)
+    own = source_file(name) if is_object(name) else policy_file(name)
+    files = [] if own is None else [own]
+    return CastMember(
+        label,
+        name,
+        params,
+        files=(*files, *(Path(str(params[key])) for key in agent.FILES if key in params)),
+        learns=agent.learns and plan.known is None,
+        drives=agent.drives,
+        promise=agent.promise,
+        manoeuvre=agent.manoeuvre,
+    )
+
+
+def params_of(plan: BatchPlan, label: str) -> Params:
+    """The parameters that a plan gives to one of its agents."""
+    return plan.agent_params(label, [p.name for p in parameters_of(plan.cast[label])])
+
+
+def shown_manoeuvres(plan: BatchPlan) -> set[str]:
+    """The manoeuvres that a plan's agents are asked for, without reading a policy's file.
+
+    An episode is shown where that file may be missing; what a policy does is in its file alone. It
+    is also shown without an agent that was an object of another session.
+    """
+    return {
+        Agent.manoeuvre
+        if policy_file(name) is not None or (is_object(name) and not is_here(name))
+        else make_agent(name, params_of(plan, label)).manoeuvre
+        for label, name in plan.cast.items()
+    }
 
 
 def teams(scenario: Scenario) -> tuple[tuple[int, ...], ...]:
@@ -55,8 +152,8 @@ def tester_bodies(scenario: Scenario) -> tuple[Body, ...]:
     return bodies
 
 
-def check_agents(plan: BatchPlan) -> None:
-    """Build every agent once and account for every parameter, before anything starts."""
+def _check_parameters(plan: BatchPlan) -> None:
+    """Refuse parameters that no agent of the plan has."""
     known = {label: [p.name for p in parameters_of(name)] for label, name in plan.cast.items()}
     shared = {key for keys in known.values() for key in keys}
     qualified = {f"{label}.{key}" for label, keys in known.items() for key in keys}
@@ -64,12 +161,3 @@ def check_agents(plan: BatchPlan) -> None:
         valid = qualified if "." in key else shared
         if key not in valid:
             raise UnknownName("parameter", key, valid, f"agent {' '.join(plan.agents)}")
-    kind = kind_named(plan.scenario.kind)
-    for label, name in plan.cast.items():
-        if label != name and label in AGENTS:
-            raise InputError(f"agent {label}={name}: the label is the name of another agent")
-        for agent in make_agents(plan, label)[:1]:
-            try:
-                agent.check_bodies(kind, plan.scenario.bodies_per_agent)
-            except ValueError as error:
-                raise InputError(f"agent {label}: {error}") from error

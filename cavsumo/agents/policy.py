@@ -17,7 +17,8 @@ from cavsumo.agents.observations import TeamObserver
 from cavsumo.agents.policy_file import TrainedPolicy, read_policy
 from cavsumo.errors import InputError, UnknownName
 from cavsumo.model.bodies import WALKING, Action, Kind
-from cavsumo.model.registry import Parameter
+from cavsumo.model.objects import factory_of, is_object
+from cavsumo.model.registry import Parameter, Registry
 from cavsumo.model.scene import Scene
 from cavsumo.model.snapshot import Snapshot
 
@@ -25,7 +26,9 @@ PREFIX = "policy:"
 
 
 def make_agent(spec: str, params: Mapping[str, Any]) -> Agent:
-    """The registered agent of that name, or the policy in ``policy:FILE``."""
+    """The registered agent of that name, the policy in ``policy:FILE``, or an object's."""
+    if is_object(spec):
+        return _own_agent(spec, params)
     file = policy_file(spec)
     if file is None:
         return AGENTS.make(spec, params)
@@ -36,7 +39,24 @@ def make_agent(spec: str, params: Mapping[str, Any]) -> Agent:
 
 def parameters_of(spec: str) -> list[Parameter]:
     """The parameters of an agent; a policy has none, all that it is is in its file."""
+    if is_object(spec):
+        return _alone(spec).parameters(spec)
     return AGENTS.parameters(spec) if policy_file(spec) is None else []
+
+
+def _own_agent(name: str, params: Mapping[str, Any]) -> Agent:
+    """The agent that an object of the user's is or builds."""
+    made = _alone(name).make(name, params)
+    if not isinstance(made, Agent):
+        raise InputError(f"agent {name}: expected a cavsumo.Agent, got {type(made).__name__}")
+    return made
+
+
+def _alone(name: str) -> Registry[Agent]:
+    """A registry of one agent, the object of that name."""
+    alone: Registry[Agent] = Registry("agent")
+    alone.register(name)(factory_of(name, f"agent {name}"))
+    return alone
 
 
 def policy_file(spec: str) -> Path | None:

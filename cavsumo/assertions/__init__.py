@@ -2,25 +2,26 @@
 
 Also what an episode is judged by besides: contacts, validity of the testers, blame, naturalness,
 criticality, ``metrics`` (functions of numbers), ``formulas`` (temporal logic).
-Importing this package registers the assertions that come with cavsumo. Nothing here moves a body.
-To add one: a file here, its name in the import below.
+Nothing here moves a body.
+To add one: a file here, its name in ``names``; it is imported when one is built.
 """
 
-from cavsumo.assertions import (  # noqa: F401  (imported to be registered)
-    collision,
-    criticality,
-    give_way,
-    hard_braking,
-    leaving_the_road,
-    reaction_zone,
-    red_light,
-    rss,
-    speed_limit,
-    standing,
-    stopping_distance,
-    two_second_gap,
-)
-from cavsumo.assertions.base import ASSERTIONS, Assertion, Judgement
-from cavsumo.assertions.specs import make_assertions
+from typing import TYPE_CHECKING
+
+from cavsumo.model.lazily import lazily
+
+if TYPE_CHECKING:
+    from cavsumo.assertions.base import ASSERTIONS, Assertion, Judgement
+    from cavsumo.assertions.specs import make_assertions
 
 __all__ = ["ASSERTIONS", "Assertion", "Judgement", "make_assertions"]
+
+__getattr__ = lazily(
+    __name__,
+    {
+        "ASSERTIONS": "cavsumo.assertions.base",
+        "Assertion": "cavsumo.assertions.base",
+        "Judgement": "cavsumo.assertions.base",
+        "make_assertions": "cavsumo.assertions.specs",
+    },
+)

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 from cavsumo.assertions.contacts import Contact
+from cavsumo.assertions.names import ASSERTION_NAMES
 from cavsumo.model.registry import Registry
 from cavsumo.model.scene import Scene
 from cavsumo.model.snapshot import Snapshot
@@ -114,4 +115,4 @@ def _weight(said: Judgement) -> tuple[int, float]:
     return SEVERITY.index(said.verdict), math.inf if when is None else when
 
 
-ASSERTIONS: Registry[Assertion] = Registry("assertion")
+ASSERTIONS: Registry[Assertion] = Registry(ASSERTION_NAMES)

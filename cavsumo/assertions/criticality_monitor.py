@@ -30,9 +30,9 @@ Pair = tuple[float, float, BodyState, BodyState]
 class Extremes(NamedTuple):
     """The extremes of an episode; infinite, or 0 for the deceleration, where nothing was near."""
 
-    ttc: float  # smallest time to collision while the ego moves [s]
-    drac: float  # largest deceleration by which the ego just avoids a collision [m/s2]
-    pet: float  # smallest post-encroachment time, 0 with a contact [s]
+    ttc: float = math.inf  # smallest time to collision while the ego moves [s]
+    drac: float = 0.0  # largest deceleration by which the ego just avoids a collision [m/s2]
+    pet: float = math.inf  # smallest post-encroachment time, 0 with a contact [s]
 
 
 class CriticalityMonitor:

@@ -5,7 +5,8 @@ further parameters are those of the assertion. It returns a number, the robustne
 assertion is violated. It returns None while its precondition does not hold.
 
 A class is built with the parameters. It derives from ``Assertion``, or has ``observe(snapshot)``,
-which returns what a function returns, and may have ``reset(scene)``.
+which returns what a function returns, and may have ``reset(scene)``. An object that observes is
+copied afresh for every episode, so that what it keeps changes no later one.
 
 Either may say ``sees_background = False``: that it never looks at background traffic or lights; and
 ``unconditional = True``: that it has no precondition.
@@ -23,6 +24,7 @@ from typing import Any
 from cavsumo.assertions.base import HELD, SEVERITY, VIOLATED, Assertion, Judgement
 from cavsumo.assertions.contacts import Contact
 from cavsumo.errors import AssertionFault, InputError
+from cavsumo.model.objects import Copies, is_instance
 from cavsumo.model.plugins import imported, said
 from cavsumo.model.scene import Scene
 from cavsumo.model.snapshot import Snapshot
@@ -36,6 +38,7 @@ class CustomAssertion(Assertion):
     def __init__(self, spec: str, params: Mapping[str, Any]) -> None:
         self.name = spec  # type: ignore[misc]  # registered ones have theirs on the class
         self._own = _made(spec, params)
+        self._again = (spec, params) if is_instance(spec) else None
         self._theirs: Judgement | None = None
         self.sees_background = bool(getattr(self._own, "sees_background", True))
         self.unconditional = bool(getattr(self._own, "unconditional", False))
@@ -43,6 +46,8 @@ class CustomAssertion(Assertion):
     def reset(self, scene: Scene) -> None:
         super().reset(scene)
         self._margin, self._theirs = math.inf, None
+        if self._again is not None:
+            self._own = _made(*self._again)
         if hasattr(self._own, "reset"):
             try:
                 self._own.reset(scene)
@@ -144,7 +149,7 @@ def custom_parameters(spec: str) -> inspect.Signature:
         found = list(inspect.signature(entry).parameters.values())
     except (TypeError, ValueError):  # of some that are not written in Python
         return inspect.Signature()
-    if not isinstance(entry, type):
+    if not isinstance(entry, type | Copies):
         found = found[2 if _takes_scene(entry) else 1 :]
     kinds = (inspect.Parameter.VAR_POSITIONAL, inspect.Parameter.POSITIONAL_ONLY)
     named = [p for p in found if p.kind not in kinds]
@@ -167,7 +172,7 @@ def _takes_scene(function: Callable[..., Any]) -> bool:
 def _made(spec: str, params: Mapping[str, Any]) -> Any:
     """The user's assertion, built; raises InputError if that is none."""
     entry = imported(spec, f"assertion {spec}", "function or class", functions=True)
-    if not isinstance(entry, type):
+    if not isinstance(entry, type | Copies):
         try:
             shown = (None,) * (2 if _takes_scene(entry) else 1)
             inspect.signature(entry).bind(*shown, **params)

@@ -11,6 +11,7 @@ from cavsumo.assertions.base import ASSERTIONS, Assertion
 from cavsumo.assertions.custom import CustomAssertion, custom_parameters
 from cavsumo.assertions.formula import FormulaAssertion
 from cavsumo.assertions.formulas import Rule, rule
+from cavsumo.assertions.names import is_formula
 from cavsumo.errors import InputError
 from cavsumo.model.plugins import imported, source_file
 from cavsumo.model.registry import Registry
@@ -56,7 +57,7 @@ def registry_of(names: Iterable[str], rules: Mapping[str, Rule]) -> Registry[Ass
     for name in names:
         if ":" in name and name not in known:
             known.register(name)(_custom(name))
-        elif set("<>=() ") & set(name):
+        elif is_formula(name):
             raise InputError(
                 f"assertion {name!r}: a formula is asserted by its name: --formula NAME='...'"
             )

@@ -10,11 +10,11 @@ from typing import Any
 
 from cavsumo.batch.dispatch import run_batch
 from cavsumo.batch.learning import Lessons
+from cavsumo.batch.messages import Answer
 from cavsumo.batch.prepared import OUTPUTS, PreparedBatch
 from cavsumo.batch.progress import Progress
 from cavsumo.batch.stopping import stopping_rule
 from cavsumo.batch.tally import Tally
-from cavsumo.batch.worker import Answer
 from cavsumo.egos.ego_files import OutputWatch
 from cavsumo.errors import BatchError
 from cavsumo.model.scenario import BatchPlan
@@ -76,10 +76,10 @@ class BatchRun:
         rule = stopping_rule(self.prepared.plan)
         reason = rule(self.tally)
         with Progress(self.prepared.plan.size, self.quiet, self.tally.rows) as progress:
-            for outcome, memory in self._answers(self._todo) if reason is None else ():
-                row = self.recorder.write(outcome)
+            for answer in self._answers(self._todo) if reason is None else ():
+                row = self.recorder.write(answer.outcome)
                 self.tally.add(row)
-                learned = self._lessons.learned(row, memory) and self._lessons.due
+                learned = self._lessons.learned(row, answer.memory) and self._lessons.due
                 if self._note_outputs() or learned:
                     self.recorder.checkpoint(self._lessons.facts())
                 progress.update(self.tally)
@@ -100,9 +100,10 @@ class BatchRun:
         self._lessons.forget(pupils)
         replaced: dict[int, Outcome] = {}
         with Progress(len(todo), self.quiet) as progress:
-            for outcome, memory in self._answers(todo):
-                self._lessons.learned(outcome.row, memory)
-                replaced[outcome.row["run"]] = outcome
+            for answer in self._answers(todo):
+                row = answer.outcome.row
+                self._lessons.learned(row, answer.memory)
+                replaced[row["run"]] = answer.outcome
                 progress.update(self.tally)
         self.cut_short = len(replaced) < len(todo)
         if self.cut_short and pupils:

@@ -22,10 +22,10 @@ from dataclasses import dataclass
 from itertools import groupby
 from typing import Any
 
-from cavsumo.agents.casting import learners
-from cavsumo.batch.jobs import Job, failed, job
+from cavsumo.batch.jobs import Job, Memory, failed, job
+from cavsumo.batch.messages import Answer
 from cavsumo.batch.prepared import PreparedBatch
-from cavsumo.batch.worker import Answer, play
+from cavsumo.batch.worker import play
 from cavsumo.errors import BatchError, CavsumoError
 
 POLL_S = 0.2  # how often to look whether to stop, while nothing finishes
@@ -36,11 +36,11 @@ def run_batch(
     executor: Executor,
     todo: Iterable[int],
     *,
-    memories: Mapping[str, Any] | None = None,
+    memories: Mapping[str, Memory] | None = None,
     ahead: int = 16,
     stopped: Callable[[], bool] = lambda: False,
 ) -> Iterator[Answer]:
-    """The outcomes of a batch in the order of ``todo``, with what the agents know after each.
+    """The answers of a batch in the order of ``todo``.
 
     Closing the iterator gives up what has not come out yet.
 
@@ -93,7 +93,7 @@ class _Line:
         self.prepared, self.executor, self.memories = prepared, executor, memories
         self._coming = self._grouped(todo)
         self.entries: deque[_Entry] = deque()
-        self._learners = learners(prepared.plan)
+        self._learners = prepared.cast.learners
 
     def join(self, ahead: int) -> None:
         """Take up episodes until so many are in line, and submit those that can start."""
@@ -116,7 +116,7 @@ class _Line:
             if entry.future is not None and entry.future.done():
                 entry.answers = self._answers(entry, entry.future)
                 if entry.agent in self._learners:
-                    self.memories[entry.agent] = entry.answers[-1][1]
+                    self.memories[entry.agent] = entry.answers[-1].memory
 
     def ready(self) -> Iterator[Answer]:
         """What can come out: all that is finished before the first that is not."""
@@ -167,5 +167,5 @@ class _Line:
         except Exception as error:  # such as dask's KilledWorker
             said = f"the executor lost it: {type(error).__name__}: {error}"
             plan = self.prepared.plan
-            answers = [(failed(plan, j, said, 0.0), j.memory) for j in self._jobs(entry)]
-        return [answer for answer in answers if answer[0].row["run"] in entry.wanted]
+            answers = [Answer(failed(plan, j, said, 0.0), j.memory) for j in self._jobs(entry)]
+        return [answer for answer in answers if answer.outcome.row["run"] in entry.wanted]

@@ -10,7 +10,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Any
 
-from cavsumo.batch.worker import close_all
+from cavsumo.batch.worker import Worker, close_all, join_group
 from cavsumo.errors import InputError
 
 CONNECT_S = 10.0  # how long to look for a scheduler, and for its first worker
@@ -23,18 +23,25 @@ class Means:
 
     Attributes:
         jobs: how many at a time; None for what the executor has.
-        executor: "local" or "dask".
+        executor: "local" or "dask", or an executor that is there already: one of
+            ``concurrent.futures``, or a dask ``Client``.
         scheduler: address of dask's scheduler.
     """
 
     jobs: int | None = None
-    executor: str = "local"
+    executor: Any = "local"
     scheduler: str | None = None
 
     def __post_init__(self) -> None:
         if self.jobs is not None and self.jobs < 1:
             raise InputError(f"jobs: expected a number of at least 1, got {self.jobs}")
-        if (self.executor == "dask") != (self.scheduler is not None):
+        ours = isinstance(self.executor, str)
+        if not (ours or isinstance(self.executor, Executor) or _is_client(self.executor)):
+            raise InputError(
+                "executor: expected a concurrent.futures.Executor or a dask Client, got "
+                f"{self.executor!r}"
+            )
+        if (ours and self.executor == "dask") != (self.scheduler is not None):
             raise InputError("--executor dask and --scheduler ADDRESS go together")
         if self.executor == "dask" and importlib.util.find_spec("distributed") is None:
             raise InputError("--executor dask needs a library: pip install 'cavsumo[dask]'")
@@ -42,24 +49,37 @@ class Means:
 
 @contextmanager
 def opened(means: Means) -> Iterator[tuple[Executor, int]]:
-    """An executor and how many episodes it plays at a time; all is ended on leaving."""
-    if means.executor == "dask":
+    """An executor and how many episodes it plays at a time; what was started is ended on leaving.
+
+    An executor of the user's is left running.
+    """
+    if isinstance(means.executor, str) and means.executor == "dask":
         with _dask(str(means.scheduler)) as (executor, threads):
             yield executor, means.jobs or threads
+    elif isinstance(means.executor, Executor):
+        yield means.executor, means.jobs or int(getattr(means.executor, "_max_workers", 1))
+    elif _is_client(means.executor):
+        yield means.executor.get_executor(), means.jobs or sum(means.executor.ncores().values())
     else:
         with local_executor(means.jobs or 1) as executor:
             yield executor, means.jobs or 1
 
 
+def _is_client(executor: Any) -> bool:
+    """Whether this is a client of dask, which need not be installed."""
+    return hasattr(executor, "get_executor") and hasattr(executor, "ncores")
+
+
 @contextmanager
 def local_executor(jobs: int) -> Iterator[Executor]:
     """Threads, each of which waits for a process of its own (``worker.play``)."""
-    executor = ThreadPoolExecutor(jobs, "cavsumo")
+    workers: set[Worker] = set()
+    executor = ThreadPoolExecutor(jobs, "cavsumo", initializer=join_group, initargs=(workers,))
     try:
         yield executor
     finally:
         executor.shutdown(wait=False, cancel_futures=True)
-        close_all()  # what is still played is not wanted any more
+        close_all(workers)  # what is still played is not wanted any more
         executor.shutdown(wait=True)
 
 

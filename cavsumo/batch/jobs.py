@@ -6,12 +6,20 @@ Imported by the parent process, so nothing here touches SUMO.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from cavsumo.model.labels import labelled
 from cavsumo.model.scenario import BatchPlan, Simulation
 from cavsumo.model.seeds import episode_seed
-from cavsumo.results.rows import Outcome, Row
+from cavsumo.results.column import FinishedEpisode
+from cavsumo.results.columns import row_of
+from cavsumo.results.rows import Outcome
+
+if TYPE_CHECKING:
+    from cavsumo.simulation.avoidability import Avoidability
+    from cavsumo.simulation.loop import Episode
+
+Memory = tuple[Any, ...]  # what the agents of an episode know, as plain data, agent by agent
 
 
 @dataclass(frozen=True)
@@ -22,7 +30,7 @@ class Job:
         run: its number in the batch.
         agent: the tester agent's label.
         seed: the episode's seed.
-        memory: what the agents learned in earlier episodes, one entry an agent; None for none.
+        memory: what the agents learned in earlier episodes; None for nothing.
         record: keep the frames whatever happens.
         simulation: "own", or "new" to start one that later jobs share as the "same".
     """
@@ -30,12 +38,12 @@ class Job:
     run: int
     agent: str
     seed: int
-    memory: tuple[Any, ...] | None = None
+    memory: Memory | None = None
     record: bool = False
     simulation: Simulation = "own"
 
 
-def job(plan: BatchPlan, run: int, memory: tuple[Any, ...] | None = None) -> Job:
+def job(plan: BatchPlan, run: int, memory: Memory | None = None) -> Job:
     """The run-th episode of a batch: agents take turns, so run i stays what it is for any N.
 
     ``memory``: what earlier episodes taught, unless the plan says what is known in all of them.
@@ -46,26 +54,18 @@ def job(plan: BatchPlan, run: int, memory: tuple[Any, ...] | None = None) -> Job
     return Job(run, label, seed, known, plan.trace == "all")
 
 
-def failed_row(plan: BatchPlan, job: Job, message: str) -> Row:
-    """The row of an episode that could not be played."""
-    return head(plan, job) | {"outcome": "error", "error": message}
+def finished(
+    plan: BatchPlan,
+    job: Job,
+    episode: Episode | None = None,
+    avoidability: Avoidability | None = None,
+    error: str = "",
+) -> FinishedEpisode:
+    """A job with what came of it: an episode, or why there is none."""
+    fresh = job.simulation == "own"
+    return FinishedEpisode(plan, job.run, job.agent, job.seed, fresh, episode, avoidability, error)
 
 
 def failed(plan: BatchPlan, job: Job, message: str, wall: float) -> Outcome:
     """The outcome of an episode that could not be played."""
-    return Outcome(failed_row(plan, job, message) | {"wall_s": wall})
-
-
-def head(plan: BatchPlan, job: Job) -> Row:
-    """The columns that are known beforehand."""
-    scenario = plan.scenario
-    return {
-        "run": job.run,
-        "agent": job.agent,
-        "ego": scenario.ego,
-        "testers": scenario.testers,
-        "reset": "fresh" if job.simulation == "own" else "shared",
-        "embodiment": scenario.embodiment,
-        "sumo_width_m": scenario.sumo_width,
-        "seed": job.seed,
-    }
+    return Outcome(row_of(finished(plan, job, error=message)) | {"wall_s": wall})

@@ -10,7 +10,6 @@ from collections.abc import Iterable, Mapping
 from concurrent.futures import Executor
 from typing import Any
 
-from cavsumo.agents.casting import learners
 from cavsumo.batch.dispatch import run_batch
 from cavsumo.batch.prepared import PreparedBatch
 from cavsumo.batch.tally import Row
@@ -28,7 +27,7 @@ class Lessons:
     """
 
     def __init__(self, prepared: PreparedBatch, recorded: Mapping[str, Any]) -> None:
-        self.names = learners(prepared.plan)
+        self.names = prepared.cast.learners
         known, after = recorded.get("learned", {}), recorded.get("learned_after", {})
         self.memories = {name: known[name] for name in self.names if name in known}
         self.after = {name: int(after.get(name, -1)) for name in self.names}
@@ -56,10 +55,8 @@ class Lessons:
 
     def catch_up(self, executor: Executor) -> None:
         """Play the episodes whose lesson is owed."""
-        for outcome, memory in run_batch(
-            self._prepared, executor, self.owed, memories=self.memories
-        ):
-            self.learned(outcome.row, memory)
+        for answer in run_batch(self._prepared, executor, self.owed, memories=self.memories):
+            self.learned(answer.outcome.row, answer.memory)
         self.owed = []
 
     def known(self) -> tuple[dict[str, Any], dict[str, int]]:

@@ -54,7 +54,9 @@ def _whole_manifest(parts: Sequence[Path]) -> dict[str, Any]:
                 + "; ".join(different)
             )
     assert first is not None
-    kept = {"command", "ego_route", "junction", "sha256", "versions", "sumo_options"} | {OUTPUTS}
+    kept = {"command", "call", "ego_route", "junction", "sha256", "versions", "sumo_options"} | {
+        OUTPUTS
+    }
     plan = dict(first["plan"]) | {"shard": None}
     return {key: first[key] for key in first if key in kept} | {
         "plan": plan,

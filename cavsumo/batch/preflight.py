@@ -57,7 +57,9 @@ class CheckedBatch:
         """The same batch, but some files are what its ego writes."""
         prepared = self.prepared.without(outputs)
         return dataclasses.replace(
-            self, prepared=prepared, manifest={**self.manifest, **manifest(prepared)}
+            self,
+            prepared=prepared,
+            manifest={**self.manifest, "sha256": manifest(prepared)["sha256"]},
         )
 
 

@@ -5,24 +5,27 @@ from __future__ import annotations
 import dataclasses
 import hashlib
 import math
+import pickle
 import sys
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Mapping, Set
 from dataclasses import dataclass, field
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from cavsumo.agents.casting import check_agents, learners, make_agents
+from cavsumo.agents.casting import Cast, resolve_cast
 from cavsumo.agents.manoeuvres import types_for
-from cavsumo.agents.policy import policy_file
 from cavsumo.assertions import make_assertions
+from cavsumo.batch.plan_names import check_names
 from cavsumo.egos import make_ego
 from cavsumo.egos.base import Ego
 from cavsumo.egos.ego_files import data_files, machine
 from cavsumo.errors import InputError
 from cavsumo.model.bodies import WALKING, Kind, kind_named
-from cavsumo.model.scenario import BatchPlan
+from cavsumo.model.objects import SentObject, objects_among
+from cavsumo.model.scenario import BatchPlan, Scenario
 from cavsumo.network.site import Site, Wishes, derive_site
 from cavsumo.network.traffic import Volume
 from cavsumo.network.traffic_lights import Pace
@@ -38,32 +41,43 @@ class PreparedBatch:
     """What a process needs to play the jobs of a batch.
 
     Attributes:
-        plan, site: what is played, and where.
+        plan, cast, site: what is played, by which agents, and where.
         folder: the working folder that the plan's files are relative to.
         checksums: of the plan's files, so that a process elsewhere notices other ones.
         versions: of what the results depend on.
         machine: that on which it was prepared; files that an ego writes differ on others.
+        objects: the agents, the ego and the assertions that are objects of a Python session.
         key: stands for all of it.
     """
 
     plan: BatchPlan
+    cast: Cast
     site: Site
     folder: str
     checksums: Mapping[str, str]
     versions: Mapping[str, str]
     machine: str = field(default_factory=machine)
+    objects: tuple[SentObject, ...] = ()
     key: str = field(init=False)
 
     def __post_init__(self) -> None:
         facts = (self.plan.model_dump_json(), self.folder, self.checksums, self.versions)
         object.__setattr__(self, "key", hashlib.sha256(repr(facts).encode()).hexdigest())
 
+    @cached_property
+    def packed(self) -> bytes:
+        """The batch as every process gets it, pickled once for all of them."""
+        return pickle.dumps({f.name: getattr(self, f.name) for f in dataclasses.fields(self)})
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return _unpacked, (self.packed,)
+
     def check_here(self) -> None:
         """Raise InputError unless this process sees the same inputs and versions.
 
         What the ego may have written since is no input (``ego_files``).
         """
-        found = {**versions(), **checksums(self.plan)}
+        found = {**versions(), **checksums(self.plan.scenario, self.cast.files)}
         free = self._written_here()
         for name, (there, here) in unequal({**self.versions, **self.checksums}, found):
             if name in free or (there is None and name not in self.versions):
@@ -82,24 +96,32 @@ class PreparedBatch:
         return dataclasses.replace(self, checksums=kept)
 
 
+def _unpacked(packed: bytes) -> PreparedBatch:
+    """A batch that came from another process; it goes on to a third one as it came."""
+    batch = object.__new__(PreparedBatch)
+    batch.__dict__.update(pickle.loads(packed), packed=packed)
+    return batch
+
+
 def prepare(plan: BatchPlan, ego: Ego | None = None) -> PreparedBatch:
     """Check every name and parameter of a plan and derive its site; raises InputError.
 
     ``ego`` drives instead of the one that the plan names.
     """
     scenario = plan.scenario
-    check_agents(plan)
-    for label in plan.cast:
-        make_agents(plan, label)[0].prepare()
+    check_names(plan)
+    cast = resolve_cast(plan)
+    for member in cast:
+        member.make().prepare()
     make_assertions(
         scenario.assertions, scenario.assertion_params, scenario.formulas, scenario.step_length
     )
     kind = kind_named(scenario.kind)
-    _check_kind(plan, kind)
-    if learners(plan) and (plan.shard or plan.reset == "shared"):
+    _check_kind(scenario, kind, cast)
+    if cast.learners and (plan.shard or plan.reset == "shared"):
         what = f"shard {plan.shard}" if plan.shard else "reset shared"
         raise InputError(
-            f"{what}: {' and '.join(sorted(learners(plan)))} learns from episode to episode, in "
+            f"{what}: {' and '.join(sorted(cast.learners))} learns from episode to episode, in "
             "sequence; learn=false plays what was learned"
         )
     ego = ego or make_ego(scenario.ego, scenario.ego_params)
@@ -108,18 +130,19 @@ def prepare(plan: BatchPlan, ego: Ego | None = None) -> PreparedBatch:
             f"ego_sensor: ego {scenario.ego} is driven by SUMO, which sees everybody; a sensor "
             "needs a controller, such as time-gap"
         )
-    site = derive_site(
-        scenario.net_file, scenario.ego_route, scenario.junction, ego.kind, wishes(plan, kind, ego)
-    )
+    asked = wishes(plan, kind, ego, {member.manoeuvre for member in cast})
+    site = derive_site(scenario.net_file, scenario.ego_route, scenario.junction, ego.kind, asked)
     if scenario.embodiment == "person" and not all(area.walk for area in site.areas):
         raise InputError("jaywalk: embodiment person needs a pavement near by, and there is none")
     if site.approaches:  # that there is room for them must not come out an episode at a time
         kinds, rng = [kind] * scenario.testers, np.random.default_rng(plan.seed)
         site.draw(kinds, ego.kind, scenario.start_speed, rng)
-    return PreparedBatch(plan, site, str(Path.cwd()), checksums(plan), versions())
+    inputs = checksums(scenario, cast.files)
+    objects = objects_among([*plan.cast.values(), scenario.ego, *scenario.assertions])
+    return PreparedBatch(plan, cast, site, str(Path.cwd()), inputs, versions(), objects=objects)
 
 
-def wishes(plan: BatchPlan, kind: Kind, ego: Ego) -> Wishes:
+def wishes(plan: BatchPlan, kind: Kind, ego: Ego, manoeuvres: Set[str]) -> Wishes:
     """What a plan asks of its site besides the route."""
     scenario = plan.scenario
     volume = None
@@ -128,7 +151,7 @@ def wishes(plan: BatchPlan, kind: Kind, ego: Ego) -> Wishes:
         volume = Volume(*scenario.traffic, duration=scenario.end + BEYOND_S, seed=seed)
     return Wishes(
         kind=kind,
-        types=approach_types(plan, kind),
+        types=approach_types(scenario, kind, manoeuvres),
         jaywalk=scenario.jaywalk,
         volume=volume,
         signal=scenario.signal,
@@ -144,36 +167,31 @@ def _top_speed(ego: Ego) -> float:
         return ego.kind.v_max
 
 
-def _check_kind(plan: BatchPlan, kind: Kind) -> None:
+def _check_kind(scenario: Scenario, kind: Kind, cast: Cast) -> None:
     """Refuse what walkers or vehicles cannot do."""
-    if plan.scenario.jaywalk and kind.name not in WALKING:
+    if scenario.jaywalk and kind.name not in WALKING:
         raise InputError(f"jaywalk: only {' and '.join(WALKING)}s start beside the road")
     if kind.name in WALKING:
-        if plan.scenario.approaches:
+        if scenario.approaches:
             raise InputError(f"kind {kind.name!r}: only vehicles have approaches; name a --kind")
         return
-    for label in plan.cast:
-        if not all(agent.drives for agent in make_agents(plan, label)):
+    for member in cast:
+        if not member.drives:
             raise InputError(
-                f"kind {kind.name!r}: agent {label} can only walk; choose another agent or kind "
-                f"{' or '.join(WALKING)}"
+                f"kind {kind.name!r}: agent {member.label} can only walk; choose another agent or "
+                f"kind {' or '.join(WALKING)}"
             )
 
 
-def approach_types(plan: BatchPlan, kind: Kind) -> tuple[str, ...]:
-    """The types of approach of a plan's vehicles; empty for all types, and for walkers.
+def approach_types(scenario: Scenario, kind: Kind, manoeuvres: Set[str]) -> tuple[str, ...]:
+    """The types of approach of a scenario's vehicles; empty for all types, and for walkers.
 
-    Those that the plan names, else those on which all agents can do the one manoeuvre that is asked
-    of them.
+    Those that the scenario names, else those on which all agents can do the one manoeuvre that is
+    asked of them.
     """
-    if plan.scenario.approaches or kind.name in WALKING:
-        return plan.scenario.approaches
-    agents = [
-        None if policy_file(name) else make_agents(plan, label)[0]
-        for label, name in plan.cast.items()
-    ]
-    names = {getattr(agent, "manoeuvre", "auto") for agent in agents}
-    return types_for(names.pop()) if len(names) == 1 else ()
+    if scenario.approaches or kind.name in WALKING:
+        return scenario.approaches
+    return types_for(next(iter(manoeuvres))) if len(manoeuvres) == 1 else ()
 
 
 def manifest(prepared: PreparedBatch) -> dict[str, Any]:

@@ -11,8 +11,8 @@ from typing import Any, NamedTuple
 
 from pydantic import ValidationError
 
-from cavsumo.agents.casting import learners
-from cavsumo.batch.jobs import Job, job
+from cavsumo.batch.jobs import Job, Memory, job
+from cavsumo.batch.messages import Answer
 from cavsumo.batch.prepared import PreparedBatch, prepare
 from cavsumo.batch.trust import check_trust
 from cavsumo.batch.worker import Worker, search
@@ -21,10 +21,10 @@ from cavsumo.model.checksums import checksum
 from cavsumo.model.documents import first_problem
 from cavsumo.model.named_networks import check_network, network_file, routes_file
 from cavsumo.model.scenario import BatchPlan, Scenario
-from cavsumo.results.columns import COLUMNS
+from cavsumo.results.columns import COLUMNS, Row
 from cavsumo.results.reading import STARTING, check_cells, inside, read_manifest, read_rows
-from cavsumo.results.rows import Outcome, Row, cell
-from cavsumo.results.traces import NOT_REPLAYED, Trace, read_trace
+from cavsumo.results.rows import cell
+from cavsumo.results.traces import NOT_REPLAYED, Trace, parsed, read_trace
 
 
 @dataclass(frozen=True)
@@ -60,6 +60,13 @@ class Record:
         return f"cavsumo replay {shlex.quote(self.file.name)}" + (
             "" if self.alone else f" {self.run}"
         )
+
+
+class Replayed(NamedTuple):
+    """An episode that was played again: its row, and its trace, None when an error left none."""
+
+    row: Row
+    trace: Trace | None
 
 
 class Difference(NamedTuple):
@@ -193,44 +200,51 @@ def prepared_again(record: Record) -> PreparedBatch:
     return prepare(record.plan)
 
 
-def replayed(worker: Worker, record: Record) -> Outcome:
+def replayed(worker: Worker, record: Record) -> Replayed:
     """An episode once more, with all that came before it and matters to it.
 
     Learners first live through their earlier episodes, or are told what they knew if a trace
     stands alone; an episode of a shared simulation comes after those before it.
     """
+    outcome = _played_again(worker, record).outcome
+    return Replayed(outcome.row, parsed(outcome.trace) if outcome.trace else None)
+
+
+def _played_again(worker: Worker, record: Record) -> Answer:
+    """What its worker answers."""
     plan, run = worker.prepared.plan, record.run
     if record.alone and record.trace is not None:
         row, memory = record.row, record.trace.head["memory"]
         again = Job(run, row["agent"], int(row["seed"]), memory, record=True)
-        return worker.play(again)[0]
+        return worker.play(again)
     if record.row["reset"] == "shared":
         first = run - run % plan.block
-        return search(worker, [job(plan, i) for i in range(first, run + 1)])[-1][0]
-    return worker.play(dataclasses.replace(job(plan, run, known(worker, run)), record=True))[0]
+        return search(worker, [job(plan, i) for i in range(first, run + 1)])[-1]
+    return worker.play(dataclasses.replace(job(plan, run, known(worker, run)), record=True))
 
 
-def known(worker: Worker, run: int) -> tuple[Any, ...] | None:
+def known(worker: Worker, run: int) -> Memory | None:
     """What the agents of an episode knew before it; a learner lives through its earlier ones."""
     plan, memory = worker.prepared.plan, job(worker.prepared.plan, run).memory
     step = len(plan.agents)
-    learns = job(plan, run).agent in learners(plan)
+    learns = job(plan, run).agent in worker.prepared.cast.learners
     for earlier in range(run % step, run, step) if learns else ():
-        _, memory = worker.play(job(plan, earlier, memory))
+        memory = worker.play(job(plan, earlier, memory)).memory
     return memory
 
 
 # Compared
 
 
-def compare(record: Record, again: Outcome) -> None:
+def compare(record: Record, again: Replayed) -> None:
     """Raise DivergenceError at the first difference of a replay from its record."""
     name = f"run {record.run} ({record.row['agent']})"
     if again.row["outcome"] == "error" != record.row["outcome"]:
         said = f"{name} could not be played again: {again.row['error']}"
         raise DivergenceError(said, None, "", "outcome")
     frames = record.trace.frames if record.trace is not None else None
-    found = first_difference(record.row, frames, again.row, again.frames)
+    frames_again = again.trace.frames if again.trace is not None else ()
+    found = first_difference(record.row, frames, again.row, frames_again)
     if found is not None:
         place, what, step, body, quantity = found
         raise DivergenceError(f"{name} diverged at {place}: {what}", step, body, quantity)
@@ -252,8 +266,10 @@ def first_difference(
             what = f"{len(frames)} frames were recorded, {len(frames_again)} replayed"
             return Difference("the end of the trace", what, end, quantity="frames")
     for column in COLUMNS:
-        if column not in NOT_REPLAYED and row.get(column, "") != cell(again.get(column)):
-            what = f"recorded {row.get(column)!r}, replayed {cell(again.get(column))!r}"
+        if column in NOT_REPLAYED or column not in row:  # of a version before it had the column
+            continue
+        if row[column] != cell(again.get(column)):
+            what = f"recorded {row[column]!r}, replayed {cell(again.get(column))!r}"
             return Difference("the row", f"{column} {what}", None, quantity=column)
     return None
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 
+from cavsumo.agents.casting import shown_manoeuvres
 from cavsumo.batch.prepared import approach_types
 from cavsumo.egos import EGOS
 from cavsumo.egos.base import EGO_KIND
@@ -26,7 +27,8 @@ def shown_site(plan: BatchPlan, trace: Trace | None) -> Site:
     InputError.
     """
     scenario, kind = plan.scenario, kind_named(plan.scenario.kind)
-    wishes = Wishes(kind=kind, types=approach_types(plan, kind), jaywalk=scenario.jaywalk)
+    types = approach_types(scenario, kind, shown_manoeuvres(plan))
+    wishes = Wishes(kind=kind, types=types, jaywalk=scenario.jaywalk)
     ego = _ego_kind(scenario, trace)
     return derive_site(scenario.net_file, scenario.ego_route, scenario.junction, ego, wishes)
 

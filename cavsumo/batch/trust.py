@@ -10,6 +10,7 @@ from collections.abc import Collection
 from pathlib import Path
 
 from cavsumo.errors import InputError
+from cavsumo.model.objects import is_object
 from cavsumo.model.scenario import Scenario
 
 SHOWN = 120  # characters of a name in a message
@@ -28,12 +29,19 @@ def check_trust(
     if allowed is None:
         return
     names = [*([scenario.ego] if ego else []), *scenario.assertions]
-    found = list(dict.fromkeys(_use(name) for name in names if name not in allowed and ":" in name))
+    found = list(
+        dict.fromkeys(_use(name) for name in names if name not in allowed and _is_foreign(name))
+    )
     if found:
         uses = " and ".join(found)
         raise InputError(
             f"{str(file)!r} names what is not cavsumo's: to play it would {uses}; --trust allows it"
         )
+
+
+def _is_foreign(name: str) -> bool:
+    """Whether using a name runs, imports or connects; an object is this session's or unknown."""
+    return ":" in name and not is_object(name)
 
 
 def _use(spec: str) -> str:

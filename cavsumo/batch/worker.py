@@ -20,24 +20,22 @@ import time
 from collections.abc import Mapping, Sequence
 from multiprocessing import Pipe
 from multiprocessing.connection import Connection
-from typing import Any
 
 from cavsumo.batch.jobs import Job, failed
+from cavsumo.batch.messages import Answer, Reply, Task
 from cavsumo.batch.prepared import PreparedBatch
-from cavsumo.batch.worker_process import GOES_ON, GOODBYE
 from cavsumo.errors import BatchError, InputError
 from cavsumo.model.offspring import kill_descendants
 from cavsumo.model.own_folders import OwnFolder, sweep_once
 from cavsumo.model.processes import by_a_lasting_thread, ending, inner_environment
 from cavsumo.model.scenario import Simulation
-from cavsumo.results.rows import Outcome, is_test
+from cavsumo.results.rows import is_test
 
 STARTUP_S = 120.0  # imports, SUMO's first start and that of the ego, on a slow machine
 STUCK_S = 20  # how long a message may stop half-way
 DISMISSAL_S = 3.0  # how long a process may take to end by itself
 ATTEMPTS = 5  # to start a process that dies while it starts
 LIFETIME = 10_000  # episodes that one process plays; SUMO leaks a little with every restart
-Answer = tuple[Outcome, Any]  # an outcome, and what the agents know afterwards
 
 
 class Worker:
@@ -48,6 +46,7 @@ class Worker:
         self._process: subprocess.Popen[bytes] | None = None
         self._busy = threading.Lock()
         self._played = 0
+        self._group: set[Worker] = getattr(_THREAD, "group", _WORKERS)
         self.closed = False
 
     def __enter__(self) -> Worker:
@@ -76,7 +75,7 @@ class Worker:
             except _ProcessGone as gone:
                 self._stop()
                 wall = time.perf_counter() - begun
-                return failed(self.prepared.plan, job, str(gone), wall), job.memory
+                return Answer(failed(self.prepared.plan, job, str(gone), wall), job.memory)
 
     def close(self) -> None:
         """End the process for good: in peace, or at once while another thread waits for it."""
@@ -88,7 +87,7 @@ class Worker:
             _kill(self._process)
         with self._busy:
             self._stop()
-        _WORKERS.discard(self)
+        self._group.discard(self)
 
     def _start(self, *, strict: bool) -> None:
         """Start the process and wait until it can play; nothing to do if it runs.
@@ -100,13 +99,14 @@ class Worker:
                 return
             self._launch(strict)
             try:
-                refusal = self._receive(STARTUP_S)
+                reply = self._receive(STARTUP_S)
             except _ProcessGone as gone:
                 self._stop()
                 refusal = f"the simulation cannot be started: {gone}"
             else:
-                if refusal is None:
+                if reply.state == "ready":
                     return
+                refusal = reply.reason
                 break  # it said no, and would again
         self._stop()
         raise InputError(refusal)
@@ -119,17 +119,17 @@ class Worker:
             except InputError as error:  # it could be started when the batch began
                 raise BatchError(f"no process to simulate in: {error}") from error
             try:
-                self._pipe.send(job)
+                self._pipe.send(Task(job=job))
             except OSError:  # it died while it waited: the job has not begun
                 self._stop()
                 continue
-            answer: Answer | str = GOES_ON
-            while answer == GOES_ON:  # each simulation has the whole deadline
-                answer = self._receive(self.prepared.plan.deadline_s)
-            if not isinstance(answer, str):
+            reply = Reply("goes on")
+            while reply.state == "goes on":  # each simulation has the whole deadline
+                reply = self._receive(self.prepared.plan.deadline_s)
+            if reply.answer is not None:
                 self._played += 1
-                return answer
-            assert answer == GOODBYE
+                return reply.answer
+            assert reply.state == "goodbye"
             self._stop()
         raise _ProcessGone("the simulation process died again and again while it waited")
 
@@ -146,7 +146,7 @@ class Worker:
         fds = theirs.fileno(), self._log.fileno()
         # what a killed process leaves goes with this folder
         environment = inner_environment() | {"TMPDIR": self._folder.name}
-        _WORKERS.add(self)
+        self._group.add(self)
         try:
             self._process = by_a_lasting_thread(lambda: self._started(fds, environment))
         except OSError as error:
@@ -158,7 +158,7 @@ class Worker:
         if self.closed:  # by another thread, which saw no process yet
             _kill(self._process)
         with contextlib.suppress(OSError):  # it died already, as _receive will find
-            self._pipe.send((self.prepared, strict))
+            self._pipe.send(Task(self.prepared, strict))
 
     def _started(
         self, fds: tuple[int, int], environment: Mapping[str, str]
@@ -179,11 +179,12 @@ class Worker:
             process_group=0,  # Ctrl-C is for the parent; and all of it can be killed
         )
 
-    def _receive(self, deadline: float) -> Any:
-        """What the process sends, or _ProcessGone when it died or took too long."""
+    def _receive(self, deadline: float) -> Reply:
+        """What the process says, or _ProcessGone when it died or took too long."""
         try:
             if self._pipe.poll(deadline):
-                return self._pipe.recv()
+                reply: Reply = self._pipe.recv()
+                return reply
         except BlockingIOError:  # it began to answer
             raise _ProcessGone(f"stuck in its answer for {STUCK_S} s, killed") from None
         except (EOFError, OSError):
@@ -248,10 +249,16 @@ def _kill(process: subprocess.Popen[bytes]) -> None:
     process.wait(10.0)
 
 
-# The workers of this process, one for each thread that plays.
+# The workers of this process, one for each thread that plays. Those of an executor of ours are a
+# group, so that batches played at the same time in one process end their own workers only.
 
-_WORKERS: set[Worker] = set()
+_WORKERS: set[Worker] = set()  # of threads in no group
 _THREAD = threading.local()
+
+
+def join_group(group: set[Worker]) -> None:
+    """Have the workers of this thread in a group."""
+    _THREAD.group = group
 
 
 def play(prepared: PreparedBatch, jobs: Sequence[Job]) -> list[Answer]:
@@ -264,7 +271,7 @@ def play(prepared: PreparedBatch, jobs: Sequence[Job]) -> list[Answer]:
     if prepared.plan.reset == "fresh":
         return [worker.play(job) for job in jobs]
     return [
-        worker.play(job) if is_test(answer[0].row) else answer
+        worker.play(job) if is_test(answer.outcome.row) else answer
         for job, answer in zip(jobs, search(worker, jobs), strict=True)
     ]
 
@@ -273,7 +280,7 @@ def search(worker: Worker, jobs: Sequence[Job]) -> list[Answer]:
     """Play jobs one after another in one simulation; behind an error, in a new one."""
     answers: list[Answer] = []
     for job in jobs:
-        goes_on = bool(answers) and answers[-1][0].row["outcome"] != "error"
+        goes_on = bool(answers) and answers[-1].outcome.row["outcome"] != "error"
         simulation: Simulation = "same" if goes_on else "new"
         answers.append(worker.play(dataclasses.replace(job, simulation=simulation)))
     return answers
@@ -284,9 +291,9 @@ def try_out(prepared: PreparedBatch) -> None:
     _own_worker(prepared).start()
 
 
-def close_all() -> None:
-    """End all processes that threads of this process have started."""
-    for worker in list(_WORKERS):
+def close_all(group: set[Worker] = _WORKERS) -> None:
+    """End all processes of a group of workers, by default of those in none."""
+    for worker in list(group):
         worker.close()
 
 

@@ -12,21 +12,23 @@ import os
 import signal
 import sys
 from multiprocessing.connection import Connection
+from typing import TYPE_CHECKING
 
-from cavsumo.batch.jobs import Job
-from cavsumo.batch.prepared import PreparedBatch
+from cavsumo.batch.messages import Reply, Task
 from cavsumo.errors import CavsumoError
+from cavsumo.model.objects import take
 from cavsumo.model.offspring import adopt_orphans, kill_descendants
 from cavsumo.model.processes import leash
 
+if TYPE_CHECKING:
+    from cavsumo.batch.episode_runner import EpisodeRunner
+
 IDLE_S = 60.0  # a process with nothing to do for so long goes
-GOODBYE = "goodbye"  # its last message then
-GOES_ON = "goes on"  # said when another simulation begins for the same job
 ALARM_AFTER_S = 30.0  # how long after an episode's deadline the process ends itself
 
 
 def main(pipe_fd: int, log_fd: int, parent: int) -> None:
-    """Set up what the first message describes, say so, then play."""
+    """Make ready for what the first task names, say so, then play."""
     leash(parent)()
     adopt_orphans()
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # the parent decides what Ctrl-C means
@@ -34,42 +36,52 @@ def main(pipe_fd: int, log_fd: int, parent: int) -> None:
     divert_output(log_fd)
     pipe = Connection(pipe_fd)
     with contextlib.suppress(EOFError, ConnectionError):  # the parent is gone or has no more jobs
-        _serve(pipe, *pipe.recv())
+        _serve(pipe, pipe.recv())
     sys.stderr.flush()
     kill_descendants(os.getpid())  # daemons of the ego that hide where they come from
     os._exit(0)  # taking Python and its libraries apart takes longer than an episode
 
 
-def _serve(pipe: Connection, prepared: PreparedBatch, strict: bool) -> None:
-    """Try out the ego and SUMO once, then play; a refusal is sent instead of None."""
+def _serve(pipe: Connection, first: Task) -> None:
+    """Try out the ego and SUMO once, then play, unless that is refused."""
     from cavsumo.batch.episode_runner import EpisodeRunner
 
+    prepared = first.batch
+    assert prepared is not None
     with contextlib.ExitStack() as stack:
+        take(prepared.objects)
         try:
             prepared.check_here()
-            runner = stack.enter_context(
-                EpisodeRunner(prepared.plan, prepared.site, prepared.checksums)
-            )
-            runner.try_out(strict=strict)
+            runner = stack.enter_context(EpisodeRunner(prepared))
+            runner.try_out(strict=first.strict)
         except (CavsumoError, OSError) as error:
-            pipe.send(str(error))
+            pipe.send(Reply("refused", str(error)))
             return
-        pipe.send(None)
+        pipe.send(Reply("ready"))
+        _play(pipe, runner, prepared.plan.deadline_s)
 
-        def alarm() -> None:
-            signal.setitimer(signal.ITIMER_REAL, prepared.plan.deadline_s + ALARM_AFTER_S)
 
-        def beat() -> None:
-            alarm()
-            pipe.send(GOES_ON)
+def _play(pipe: Connection, runner: EpisodeRunner, deadline: float) -> None:
+    """Play what is asked for until there is nothing to do for long.
 
-        while pipe.poll(IDLE_S):
-            job: Job = pipe.recv()
-            alarm()
-            answer = runner.play(job, beat)
-            signal.setitimer(signal.ITIMER_REAL, 0.0)
-            pipe.send(answer)
-        pipe.send(GOODBYE)
+    ``deadline``: of each simulation [s].
+    """
+
+    def alarm() -> None:
+        signal.setitimer(signal.ITIMER_REAL, deadline + ALARM_AFTER_S)
+
+    def beat() -> None:
+        alarm()
+        pipe.send(Reply("goes on"))
+
+    while pipe.poll(IDLE_S):
+        task: Task = pipe.recv()
+        assert task.job is not None
+        alarm()
+        answer = runner.play(task.job, beat)
+        signal.setitimer(signal.ITIMER_REAL, 0.0)
+        pipe.send(Reply("played", answer=answer))
+    pipe.send(Reply("goodbye"))
 
 
 def divert_output(log_fd: int) -> None:

@@ -5,8 +5,8 @@ from __future__ import annotations
 import argparse
 import os
 import sys
-from collections.abc import Sequence
-from typing import NoReturn
+from collections.abc import Callable, Sequence
+from typing import Any, NoReturn
 
 from cavsumo import __version__
 from cavsumo.cli.options.certify import add_certify
@@ -32,6 +32,9 @@ def main(argv: Sequence[str] | None = None) -> int:
     """The command ``cavsumo``; returns the exit status."""
     try:
         words = sys.argv[1:] if argv is None else argv
+        if not words:
+            _parser().print_help()
+            return Exit.USAGE
         options = _parser().parse_args(_joined(words))
         status: int = options.command(options)
         return status
@@ -72,7 +75,20 @@ def _joined(words: Sequence[str]) -> list[str]:
 
 
 class _OptionParser(argparse.ArgumentParser):
-    """argparse with our way of saying no: one sentence, exit status 2."""
+    """argparse with our way of saying no: one sentence, exit status 2.
+
+    Attributes:
+        fill: adds the options of a command whose options are read from the scenario record, once
+            that command is called; the help of all commands does without them.
+    """
+
+    fill: Callable[[argparse.ArgumentParser], None] | None = None
+
+    def parse_known_args(self, args: Any = None, namespace: Any = None) -> Any:
+        fill, self.fill = self.fill, None
+        if fill is not None:
+            fill(self)
+        return super().parse_known_args(args, namespace)
 
     def error(self, message: str) -> NoReturn:
         raise InputError(f"{message} (see {self.prog} --help)")

@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import ClassVar, NamedTuple
 
+from cavsumo.egos.names import EGO_NAMES
 from cavsumo.model.bodies import CAR, Kind
 from cavsumo.model.carriageway import Light
 from cavsumo.model.polyline import Path as Polyline
@@ -96,4 +97,4 @@ class Ego:
         return ""
 
 
-EGOS: Registry[Ego] = Registry("ego")
+EGOS: Registry[Ego] = Registry(EGO_NAMES)

@@ -1,7 +1,8 @@
-"""Egos from the user: a Python class named ``module:Class``, kept from doing harm.
+"""Egos from the user: a Python class named ``module:Class`` or an object, kept from doing harm.
 
 The class is built with the ego's parameters as keywords. It has ``act(snapshot)``, which answers
-``Acceleration`` or ``Drive``, and may have ``reset(scene)``, ``kind`` and ``depart_speed``.
+``Acceleration`` or ``Drive``, and may have ``reset(scene)``, ``kind`` and ``depart_speed``. Of an
+object every episode has a fresh copy, so that what it keeps changes no later episode.
 """
 
 from __future__ import annotations
@@ -13,6 +14,7 @@ from cavsumo.egos.base import EGO_KIND, Command, Ego
 from cavsumo.egos.effectors import checked, within
 from cavsumo.errors import EgoError, InputError
 from cavsumo.model.bodies import Kind
+from cavsumo.model.objects import Copies
 from cavsumo.model.plugins import imported, said
 from cavsumo.model.scene import Scene
 from cavsumo.model.snapshot import Snapshot
@@ -27,6 +29,7 @@ class ControllerEgo(Ego):
             self.controller = factory(**params)
         except Exception as error:
             raise InputError(f"ego {spec}: cannot be built: {said(error)}") from error
+        self._copies = factory if isinstance(factory, Copies) else None
         if not callable(getattr(self.controller, "act", None)):
             raise InputError(f"ego {spec}: has no method act(snapshot)")
         self.kind = getattr(self.controller, "kind", EGO_KIND)
@@ -43,6 +46,8 @@ class ControllerEgo(Ego):
     def reset(self, scene: Scene) -> None:
         self._sort: type | None = None
         try:
+            if self._copies is not None:
+                self.controller = self._copies()
             if hasattr(self.controller, "reset"):
                 self.controller.reset(scene)
         except Exception as error:

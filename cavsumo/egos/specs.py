@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -10,6 +10,7 @@ from typing import Any
 from cavsumo.egos.base import EGOS, Ego
 from cavsumo.egos.controller import ControllerEgo, controller_class
 from cavsumo.egos.external.ego import EXTERNAL, command_words
+from cavsumo.model.objects import Copies, is_object
 from cavsumo.model.plugins import source_file
 from cavsumo.model.registry import Registry
 
@@ -27,10 +28,24 @@ def make_ego(spec: str, params: Mapping[str, Any]) -> Ego:
     if not colon:
         return EGOS.make(spec, params)
     if sort in EXTERNAL:
-        alone: Registry[Ego] = Registry("ego")  # so that the messages name all of it
-        alone.register(spec)(partial(EXTERNAL.get(sort), spec))
-        return alone.make(spec, params)
-    return ControllerEgo(spec, controller_class(spec), params)
+        return _alone(spec, partial(EXTERNAL.get(sort), spec)).make(spec, params)
+    factory = controller_class(spec)
+    if is_object(spec) and _leaves_driving_to_sumo(factory):
+        return _alone(spec, factory).make(spec, params)
+    return ControllerEgo(spec, factory, params)
+
+
+def _alone(spec: str, factory: Callable[..., Ego]) -> Registry[Ego]:
+    """A registry of one ego, so that its messages name all of it."""
+    alone: Registry[Ego] = Registry("ego")
+    alone.register(spec)(factory)
+    return alone
+
+
+def _leaves_driving_to_sumo(factory: Callable[..., Any]) -> bool:
+    """Whether an object, or what a class makes, is an ego that SUMO drives."""
+    made = type(factory()) if isinstance(factory, Copies) else factory
+    return isinstance(made, type) and issubclass(made, Ego) and made.act is Ego.act
 
 
 def ego_files(spec: str) -> tuple[Path, ...]:

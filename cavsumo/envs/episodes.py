@@ -10,7 +10,6 @@ import weakref
 from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
-from cavsumo.agents.casting import make_agents
 from cavsumo.agents.observations import TeamObserver
 from cavsumo.batch.prepared import PreparedBatch
 from cavsumo.envs.ego_observations import EgoObserver
@@ -122,7 +121,7 @@ class Episodes:
             self._puppets = [
                 PuppetAgent(roles.actions, sees_background=roles.drawn) for _ in setup.teams
             ]
-        self._agents = self._puppets or make_agents(prepared.plan, roles.agent or "")
+        self._agents = self._puppets or prepared.cast.agents(roles.agent or "")
         teams = [team_name(setup.bodies, team) for team in setup.teams if self._puppets]
         self._teams = tuple(teams)
         self._names = (*teams, EGO) if self._puppet_ego else self._teams

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from typing import Any
 
 from cavsumo.assertions.base import NOT_TRIGGERED, UNFAIR, VIOLATED, Assertion
-from cavsumo.batch.episode_runner import measured
+from cavsumo.results.columns import measured
 from cavsumo.simulation.loop import EpisodeLoop
 
 # The keys of ``info`` with their meaning.

@@ -1,17 +1,19 @@
-"""A snapshot as a picture from above, with Pillow: roads, the ego's path and zones, everybody.
+"""A snapshot as a picture from above, with Pillow: the place, the ego's zones, everybody.
 
 The picture follows the ego. It is drawn twice as large and then reduced, for smooth edges.
 """
 
 from __future__ import annotations
 
+import dataclasses
 import math
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Sequence
 from typing import Any
 
 import numpy as np
 import shapely
 from numpy.typing import NDArray
+from shapely.ops import substring
 
 from cavsumo.agents.triggers import MAX_DECEL, REACTION_TIME
 from cavsumo.batch.prepared import PreparedBatch
@@ -20,6 +22,7 @@ from cavsumo.model.bodies import WALKING
 from cavsumo.model.geometry import Box, corners
 from cavsumo.model.snapshot import BodyState, Snapshot
 from cavsumo.model.stopping_zones import zone_polygons
+from cavsumo.network.drawing.place import COLOURS, GROUND, DrawnPlace, site_drawn
 
 try:
     from PIL import Image, ImageDraw, ImageFont
@@ -30,14 +33,14 @@ WIDTH, HEIGHT = 720, 540  # px
 SCALE = 11.0  # px/m
 FINER = 2  # drawn so many times larger
 AHEAD_M = 16.0  # the middle of the picture is so far ahead of the ego
-DASH_M = 2.0  # of the ego's path
+LINES_M = {"borders": 0.14, "solid": 0.12, "dashed": 0.12, "route": 0.2}  # widths
+DASHES_M = {"borders": 0.4, "dashed": 3.0, "route": 2.0}  # lengths of a dash, and of a gap
 HEAD_M = 0.3  # radius of who walks, seen from above
 
-GROUND, ROAD, PAVEMENT, MARKING = "#e9ece2", "#8b9096", "#d3ccbb", "#f4f4f0"
-CROSSING, AXIS = "#b9bcbd", "#9a9fa4"
-PATH, EGO, TESTER, CAR, PERSON = "#1b7837", "#1f5fa8", "#d6402b", "#f0f0ec", "#6a51a3"
+EGO, TESTER, CAR, PERSON = "#1f5fa8", "#d6402b", "#f0f0ec", "#6a51a3"
 BRAKING, REACTION = (214, 64, 43, 150), (245, 179, 1, 150)
 LIGHTS = {"r": "#d7191c", "u": "#d7191c", "y": "#f5b301", "g": "#1a9641"}
+UNLIT = "#f4f4f0"
 TEXT, OUTLINE = "#222222", "#303030"
 
 Points = Sequence[tuple[float, float]]
@@ -47,16 +50,7 @@ class Painter:
     """Paints the snapshots of a scenario."""
 
     def __init__(self, prepared: PreparedBatch) -> None:
-        site = prepared.site
-        self._path, self._lights = site.route.path, site.lights
-        self._carriageway, self._lanes = site.roads.carriageway, site.roads.lanes
-        self._pavements = shapely.union_all(
-            [
-                shapely.LineString(area.pavement.points).buffer(area.width / 2, cap_style="flat")
-                for area in site.areas
-            ]
-        )
-        self._crossings = site.crossings
+        self._place = _dashed(site_drawn(prepared.site))
         self._font = ImageFont.load_default(15 * FINER)
         params = prepared.plan.scenario.assertion_params
         self._decel = float(params.get("max_decel", MAX_DECEL))
@@ -65,8 +59,7 @@ class Painter:
     def paint(self, snapshot: Snapshot) -> NDArray[np.uint8]:
         """The picture, uint8 of shape (HEIGHT, WIDTH, 3)."""
         canvas = _Canvas(_middle(snapshot.ego))
-        self._ground(canvas)
-        self._way(canvas, snapshot)
+        self._ground(canvas, snapshot)
         self._zones(canvas, snapshot)
         for body in snapshot.background:
             _draw(canvas, body, PERSON if body.body.kind.name in WALKING else CAR)
@@ -76,26 +69,16 @@ class Painter:
         self._words(canvas, snapshot)
         return canvas.pixels()
 
-    def _ground(self, canvas: _Canvas) -> None:
-        """Pavements, carriageways, crossings and the middles of lanes."""
-        canvas.areas(self._pavements, PAVEMENT)
-        canvas.areas(self._carriageway, ROAD)
-        for lane in self._lanes:
-            canvas.lines(lane, AXIS, 0.12)
-        canvas.areas(self._crossings, CROSSING)
-
-    def _way(self, canvas: _Canvas, snapshot: Snapshot) -> None:
-        """The ego's path in dashes, and the traffic lights on it."""
-        path = self._path
-        for i in range(0, int(path.length / DASH_M), 2):
-            begin, end = i * DASH_M, min((i + 1) * DASH_M, path.length)
-            if canvas.shows(*path.at(begin)[:2]):
-                canvas.line([path.at(begin)[:2], path.at(end)[:2]], PATH, 0.2)
-        for light, letter in zip(self._lights, snapshot.lights, strict=False):
-            x, y, o = path.at(light.along)
-            dx, dy = -1.6 * math.sin(o), 1.6 * math.cos(o)
-            colour = LIGHTS.get(letter.lower(), MARKING)
-            canvas.line([(x - dx, y - dy), (x + dx, y + dy)], colour, 0.5)
+    def _ground(self, canvas: _Canvas, snapshot: Snapshot) -> None:
+        """The place, and what the traffic lights on the ego's route show."""
+        seen = self._place.within(canvas.window)
+        for role, colour in COLOURS.items():
+            for ring in seen.areas.get(role, ()):
+                canvas.area(ring, colour)
+            for points in seen.lines.get(role, ()):
+                canvas.line(points, colour, LINES_M[role])
+        for stop, letter in zip(self._place.stops, snapshot.lights, strict=False):
+            canvas.line(stop.coords, LIGHTS.get(letter.lower(), UNLIT), 0.5)
 
     def _zones(self, canvas: _Canvas, snapshot: Snapshot) -> None:
         """The braking and the reaction zone of the reaction-zone assertion."""
@@ -123,26 +106,13 @@ class _Canvas:
         self._scale = SCALE * FINER
         half_w, half_h = WIDTH / SCALE / 2, HEIGHT / SCALE / 2
         self._west, self._north = middle[0] - half_w, middle[1] + half_h
-        self._window = (self._west, middle[1] - half_h, middle[0] + half_w, self._north)
+        self.window = (self._west, middle[1] - half_h, middle[0] + half_w, self._north)
         self._image = Image.new("RGB", (WIDTH * FINER, HEIGHT * FINER), GROUND)
         self._pen = ImageDraw.Draw(self._image, "RGBA")
 
-    def shows(self, x: float, y: float) -> bool:
-        """Whether a point lies in the picture."""
-        west, south, east, north = self._window
-        return west <= x <= east and south <= y <= north
-
-    def areas(self, geometry: shapely.Geometry, colour: str) -> None:
-        """Fill polygons; their holes show the ground."""
-        for part in _parts(shapely.clip_by_rect(geometry, *self._window), "Polygon"):
-            self._pen.polygon(self._pixels(part.exterior.coords), fill=colour)
-            for hole in part.interiors:
-                self._pen.polygon(self._pixels(hole.coords), fill=GROUND)
-
-    def lines(self, geometry: shapely.Geometry, colour: str, width: float) -> None:
-        """Draw polylines of a width [m]."""
-        for part in _parts(shapely.clip_by_rect(geometry, *self._window), "LineString"):
-            self.line(part.coords, colour, width)
+    def area(self, points: Points, colour: str) -> None:
+        """Fill one polygon."""
+        self._pen.polygon(self._pixels(points), fill=colour)
 
     def line(self, points: Iterable[Sequence[float]], colour: str, width: float) -> None:
         """Draw one polyline of a width [m]."""
@@ -199,10 +169,16 @@ def _draw(canvas: _Canvas, state: BodyState, colour: str) -> None:
         canvas.tint(corners(pane), (30, 40, 55, 200))
 
 
-def _parts(geometry: shapely.Geometry, sort: str) -> Iterator[Any]:
-    """The parts of a geometry that are polygons, or lines."""
-    for part in getattr(geometry, "geoms", [geometry]):
-        if hasattr(part, "geoms"):
-            yield from _parts(part, sort)
-        elif part.geom_type == sort and not part.is_empty:
-            yield part
+def _dashed(place: DrawnPlace) -> DrawnPlace:
+    """The place with its broken lines in dashes, which lie still while the picture moves."""
+    lines = {
+        role: [_dashes(line, DASHES_M[role]) for line in found] if role in DASHES_M else found
+        for role, found in place.lines.items()
+    }
+    return dataclasses.replace(place, lines=lines)
+
+
+def _dashes(line: shapely.LineString, length: float) -> shapely.Geometry:
+    """A line as dashes with gaps of the same length [m]."""
+    starts = np.arange(0.0, line.length, 2 * length).tolist()
+    return shapely.MultiLineString([substring(line, s, s + length) for s in starts])

@@ -7,7 +7,6 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from cavsumo.agents.casting import learners
 from cavsumo.batch.prepared import PreparedBatch, prepare
 from cavsumo.egos import make_ego
 from cavsumo.egos.base import Ego
@@ -15,12 +14,13 @@ from cavsumo.envs.puppets import ACTIONS, PuppetEgo
 from cavsumo.errors import InputError, UnknownName
 from cavsumo.model.bodies import WALKING
 from cavsumo.model.checks import choice, whole
-from cavsumo.model.scenario import SCENARIO_KEYS, plan_from
+from cavsumo.model.scenario import plan_from
+from cavsumo.model.scenario.fields import settings as offered
 from cavsumo.model.scenario_file import read_config
 
 UNTIL = ("game", "verdict")
 PROCESSES = ("this", "own")
-KEYS = SCENARIO_KEYS | {"seed", "params"}  # of a scenario file, what matters to an environment
+KEYS = frozenset(s.key for s in offered() if s.environments)  # keywords of the environments
 
 
 @dataclass(frozen=True)
@@ -86,12 +86,13 @@ def prepared_for(
     plan = plan_from(settings | {"agents": (roles.agent or "noop",)}, source)
     if roles.actions == "targets" and plan.scenario.kind not in WALKING:
         raise InputError(f"{source}: actions 'targets' are for {' and '.join(WALKING)}s only")
-    if learners(plan):
+    prepared = prepare(plan, PuppetEgo(**roles.ego) if roles.ego is not None else None)
+    if prepared.cast.learners:
         raise InputError(
             f"{source}: agent {roles.agent} learns from episode to episode, so a seed would not "
             "make an episode; params={'learn': False} plays what was learned"
         )
-    return prepare(plan, PuppetEgo(**roles.ego) if roles.ego is not None else None)
+    return prepared
 
 
 def _refuse_what_is_learned(

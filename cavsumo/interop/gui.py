@@ -1,7 +1,8 @@
 """A trace shown in sumo-gui: every body is put where it was, timestep by timestep.
 
-Nothing is simulated here: sumo-gui has the network, and is told by TraCI where everybody is. It
-runs in a process of its own and comes with the extra ``[osm]`` (eclipse-sumo and traci).
+Nothing is simulated here: sumo-gui has the network, is given the ego's route as a polygon, and is
+told by TraCI where everybody is. It runs in a process of its own and comes with the extra ``[osm]``
+(eclipse-sumo and traci).
 """
 
 from __future__ import annotations
@@ -20,6 +21,7 @@ from xml.sax.saxutils import quoteattr
 
 from cavsumo.errors import InputError
 from cavsumo.model.scenario import Scenario
+from cavsumo.network.drawing.place import COLOURS, DrawnPlace, site_drawn
 from cavsumo.network.osm.netconvert import sumo_environment, sumo_home
 from cavsumo.network.site import Site
 from cavsumo.results.traces import Shape, Trace, states
@@ -32,6 +34,7 @@ ZOOM = 1500.0  # per cent; some 80 m across the window
 KEEP_EXACT = 2  # moveToXY: exactly there, on the network or off it
 DELAY_MOST = 60_000.0  # ms
 CONNECT_S = 60  # how long sumo-gui may take to start
+ROUTE_WIDTH, ROUTE_LAYER = 0.3, 10  # m; above the lanes, below the bodies
 WAY = "cavsumo_way"  # a route that every vehicle is given; nobody follows it
 
 
@@ -70,7 +73,7 @@ def show(
     delay = 1000.0 * scenario.step_length if delay_ms is None else delay_ms
     with TemporaryDirectory(prefix="cavsumo-gui-") as folder:
         types = Path(folder) / "types.add.xml"
-        types.write_text(_type_file(trace), encoding="utf-8")
+        types.write_text(additional_file(trace, site_drawn(site)), encoding="utf-8")
         port = sumolib.miscutils.getFreeSocketPort()
         words = command(program, site.net, types, scenario.step_length, delay, close=close)
         words += ["--remote-port", str(port)]
@@ -109,8 +112,8 @@ def command(
     return [str(program), *(word for key, text in options.items() for word in (f"--{key}", text))]
 
 
-def _type_file(trace: Trace) -> str:
-    """A vehicle type for each box and part."""
+def additional_file(trace: Trace, place: DrawnPlace) -> str:
+    """A vehicle type for each box and part, and the ego's route."""
     rows = [
         f"  <vType id={quoteattr(_type(part, shape))} length={quoteattr(f'{shape.length}')} "
         f'width={quoteattr(f"{shape.width}")} minGap="0" color={quoteattr(COLORS[part])} '
@@ -118,7 +121,18 @@ def _type_file(trace: Trace) -> str:
         for part in COLORS
         for shape in sorted(set(trace.shapes().values()))
     ]
-    return "\n".join(["<additional>", *rows, "</additional>", ""])
+    return "\n".join(["<additional>", *rows, *_routes(place), "</additional>", ""])
+
+
+def _routes(place: DrawnPlace) -> list[str]:
+    """The ego's routes as polygons of sumo-gui, which draws the rest of the place itself."""
+    colour = ",".join(str(part) for part in bytes.fromhex(COLOURS["route"].removeprefix("#")))
+    return [
+        f'  <poly id="ego_route{i}" type="ego route" color="{colour}" fill="0" '
+        f'lineWidth="{ROUTE_WIDTH}" layer="{ROUTE_LAYER}" '
+        f'shape="{" ".join(f"{x:.2f},{y:.2f}" for x, y in line.coords)}"/>'
+        for i, line in enumerate(place.lines["route"])
+    ]
 
 
 def _type(part: str, shape: Shape) -> str:

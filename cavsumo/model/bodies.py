@@ -11,10 +11,8 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, NamedTuple
 
-import numpy as np
-
 from cavsumo.errors import InputError, UnknownName
-from cavsumo.model.kinematics import wrap
+from cavsumo.model.geometry import wrap
 
 if TYPE_CHECKING:
     from gymnasium import spaces
@@ -164,6 +162,7 @@ class AgentBodyEffectorModel:
 
     def action_space(self, effectors: Sequence[str]) -> spaces.Box:
         """A(E'): the product of the effectors' intervals, one dimension an effector."""
+        import numpy as np
         from gymnasium import spaces
 
         bounds = np.array([self.actions[e] for e in effectors], dtype=np.float64).reshape(-1, 2)

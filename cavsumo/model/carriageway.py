@@ -102,11 +102,6 @@ class Limit(NamedTuple):
     speed: float
 
 
-# How a vehicle's way lies to the ego's: across it, into its lane, on its lane ahead of it, in a
-# lane beside it.
-APPROACHES = ("crossing", "merging", "following", "adjacent")
-
-
 @dataclass(frozen=True, slots=True, eq=False)
 class Approach:
     """A way along lanes on which a vehicle can meet the ego.
@@ -114,7 +109,7 @@ class Approach:
     Arc lengths are those of the centre of a body that follows the path [m].
 
     Attributes:
-        type: one of APPROACHES.
+        type: a ``vocabulary.ApproachType``.
         path: centre line of its lanes, through the junction and on.
         edges: ids of the edges along it.
         wait: where a body waits that gives way; infinite where there is nothing to wait for.

@@ -1,4 +1,4 @@
-"""Oriented boxes on the plane: overlap, distance, coordinates seen from another pose.
+"""Oriented boxes on the plane: overlap, distance, coordinates seen from another pose; angles.
 
 Lengths in metres, angles in radians anticlockwise from east. Plain floats only, for the simulator's
 inner loop; NaN in a box is not checked for.
@@ -25,6 +25,16 @@ class Box(NamedTuple):
     heading: float
     length: float
     width: float
+
+
+def wrap(angle: float) -> float:
+    """Return `angle` [rad] brought into (-pi, pi] (seed, eqs 19 and 21); -pi becomes +pi.
+
+    Raises:
+        ValueError: the angle is infinite.
+    """
+    wrapped = math.remainder(angle, math.tau)
+    return math.pi if wrapped <= -math.pi else wrapped
 
 
 def corners(box: Box) -> list[Point]:

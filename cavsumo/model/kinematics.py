@@ -20,7 +20,7 @@ It holds because the centre moves on a circle of radius (b / 2) / sin(beta): a c
 turn angle off the tangent, and the tangent is o + beta. The position uses the old speed v.
 
 The array functions check their input. `step_floats` and `steering_for_turn` serve one body in an
-inner loop, where NumPy costs ten times more: tests/test_kinematics.py holds the copies together.
+inner loop, where NumPy costs ten times more: tests/unit/test_kinematics.py compares the copies.
 """
 
 from __future__ import annotations
@@ -31,6 +31,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from cavsumo.errors import NoSuchAction
+from cavsumo.model.geometry import wrap as wrap
 
 FloatArray = NDArray[np.float64]
 
@@ -229,16 +230,6 @@ def steering_for_turn(v: float, turn: float, wheelbase: float, dt: float) -> flo
             f"(needs v > 0 and {wheelbase} * |turn| < 2 v dt = {twice})"
         )
     return math.atan2(2.0 * wheelbase * turn, math.sqrt(twice - arc) * math.sqrt(twice + arc))
-
-
-def wrap(angle: float) -> float:
-    """Return `angle` [rad] brought into (-pi, pi] (seed, eqs 19 and 21); -pi becomes +pi.
-
-    Raises:
-        ValueError: the angle is infinite.
-    """
-    wrapped = math.remainder(angle, math.tau)
-    return math.pi if wrapped <= -math.pi else wrapped
 
 
 def _wrap(angle: FloatArray) -> FloatArray:

@@ -1,4 +1,7 @@
-"""Things of the user's, named ``module:attribute``: importing them, and the files they stand in."""
+"""Things of the user's, named ``module:attribute``: importing them, and the files they stand in.
+
+Objects of the user's session have names too (``objects``), and are found by the same functions.
+"""
 
 from __future__ import annotations
 
@@ -9,6 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from cavsumo.errors import InputError, UnknownName
+from cavsumo.model.objects import factory_of, is_object, module_file
 
 
 def imported(spec: str, what: str, noun: str, *, functions: bool = False) -> Callable[..., Any]:
@@ -18,6 +22,8 @@ def imported(spec: str, what: str, noun: str, *, functions: bool = False) -> Cal
     has not or that cannot be called; ``what`` begins the message, ``noun`` is what the attribute
     should be, and functions are among the names suggested if it may be one.
     """
+    if is_object(spec):
+        return factory_of(spec, what)
     module_name, _, name = spec.partition(":")
     here = str(Path.cwd())
     if here not in sys.path:
@@ -40,11 +46,15 @@ def imported(spec: str, what: str, noun: str, *, functions: bool = False) -> Cal
 
 
 def source_file(spec: str) -> Path | None:
-    """The file of an imported module, relative to the working folder if it lies there."""
-    source = getattr(sys.modules[spec.partition(":")[0]], "__file__", None)
-    if source is None:
+    """The file of an imported module or of an object's, relative to the working folder if there."""
+    if is_object(spec):
+        file = module_file(spec)
+    else:
+        source = getattr(sys.modules[spec.partition(":")[0]], "__file__", None)
+        file = None if source is None else Path(source)
+    if file is None:
         return None
-    file, here = Path(source), Path.cwd()
+    here = Path.cwd()
     return file.relative_to(here) if file.is_relative_to(here) else file
 
 

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from typing import Any, Generic, TypeVar
 
 from cavsumo.errors import InputError, UnknownName
+from cavsumo.model.names import Names
 
 T = TypeVar("T")
 
@@ -26,10 +27,15 @@ class Registry(Generic[T]):
 
     Each is called with keyword parameters only; their defaults come from the signature, their
     meaning and units from the class attribute ``PARAMETERS`` (name to one line).
+
+    Args:
+        names: those that are declared; their modules are imported when something is built. Or the
+            sort alone.
     """
 
-    def __init__(self, sort: str) -> None:
-        self.sort = sort
+    def __init__(self, names: Names | str) -> None:
+        self.names = names if isinstance(names, Names) else Names(names)
+        self.sort = self.names.sort
         self._entries: dict[str, Callable[..., T]] = {}
 
     def register(self, name: str) -> Callable[[Callable[..., T]], Callable[..., T]]:
@@ -38,21 +44,23 @@ class Registry(Generic[T]):
         def file(entry: Callable[..., T]) -> Callable[..., T]:
             if name in self._entries:
                 raise ValueError(f"{self.sort} {name!r} is registered already")
+            self.names.add(name, getattr(entry, "__module__", None))
             self._entries[name] = entry
             return entry
 
         return file
 
     def __contains__(self, name: str) -> bool:
-        return name in self._entries
+        return name in self.names
 
     def __iter__(self) -> Iterator[str]:
-        return iter(sorted(self._entries))
+        return iter(self.names)
 
     def get(self, name: str) -> Callable[..., T]:
         """The class filed under a name, or UnknownName with the nearest one."""
         if name not in self._entries:
-            raise UnknownName(self.sort, name, self._entries)
+            self.names.check(name)
+            self.names.load(name)
         return self._entries[name]
 
     def summary(self, name: str) -> str:

@@ -21,6 +21,7 @@ from cavsumo.model.carriageway import Approach, Light, Limit, MarkedCrossing, Ro
 from cavsumo.model.geometry import Box
 from cavsumo.model.scene import Scene
 from cavsumo.model.stopping_way import is_clear
+from cavsumo.model.vocabulary import Signal
 from cavsumo.network.approaches import approaches
 from cavsumo.network.ego_routes import (
     EgoRoute,
@@ -40,7 +41,7 @@ from cavsumo.network.pedestrian_starts import (
 from cavsumo.network.reader import Network, read_network
 from cavsumo.network.route_rules import crossings_along, limits_along
 from cavsumo.network.traffic import Volume, background
-from cavsumo.network.traffic_lights import LightStart, Pace, Signal, light_start, lights_along
+from cavsumo.network.traffic_lights import LightStart, Pace, light_start, lights_along
 from cavsumo.network.vehicle_starts import draw_vehicles
 
 GROUND_M = 100.0  # the ground is told so far from the ego's path

@@ -9,14 +9,14 @@ import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import Any, Literal
+from typing import Any
 
 from cavsumo.errors import NetworkError
 from cavsumo.model.carriageway import Light
+from cavsumo.model.vocabulary import Signal
 from cavsumo.network.ego_routes import EgoRoute, lanes_along
 from cavsumo.network.reader import Network
 
-Signal = Literal["any", "green", "red"]
 # SUMO's letters of a link; G comes before g, which gives way.
 LETTERS = {"green": ("G", "g"), "red": ("r",)}
 PREPARED_S = 1.0  # the colour has been shown that long when the ego starts, if it lasts

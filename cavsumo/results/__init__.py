@@ -1,8 +1,8 @@
 """What is left of episodes: columns, rows, traces and manifests, written and read.
 
 ``writing`` writes a batch, ``reading`` reads it, ``provenance`` says what identifies it. Nothing
-here plays an episode. To add a column: its name and meaning in ``columns``, its value in
-``batch/episode_runner``.
+here plays an episode. To add a column: an entry in ``columns``, and the table of docs/results.md by
+``columns.markdown_table``.
 """
 
 from cavsumo.results.reading import read_results, read_rows

@@ -5,15 +5,15 @@ from __future__ import annotations
 import hashlib
 import importlib.metadata
 import platform
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
+from pathlib import Path
 from typing import Any
 
 from cavsumo import __version__
-from cavsumo.agents.casting import agent_files
 from cavsumo.assertions.specs import assertion_files
 from cavsumo.egos.specs import ego_files
 from cavsumo.model.checksums import checksum
-from cavsumo.model.scenario import BatchPlan
+from cavsumo.model.scenario import Scenario
 from cavsumo.network.site import Site
 
 # Settings that say how much of a batch to play and not what its episodes are.
@@ -22,13 +22,12 @@ EXTENT = frozenset(
 )
 
 
-def checksums(plan: BatchPlan) -> dict[str, str]:
-    """The SHA-256 of every file that a plan names, those of its ego and assertions among them."""
-    scenario = plan.scenario
+def checksums(scenario: Scenario, agent_files: Iterable[Path]) -> dict[str, str]:
+    """The SHA-256 of every file of a batch: its scenario's, its ego's, agents' and assertions'."""
     found = {str(scenario.net): scenario.net_file}
     if scenario.routes is not None and scenario.routes_file is not None:
         found[str(scenario.routes)] = scenario.routes_file
-    files = [*scenario.additional, *agent_files(plan), *ego_files(scenario.ego)]
+    files = [*scenario.additional, *agent_files, *ego_files(scenario.ego)]
     files += assertion_files(scenario.assertions)
     found |= {str(file): file for file in files}
     return {name: checksum(file) for name, file in found.items()}

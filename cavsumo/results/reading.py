@@ -155,10 +155,32 @@ def check_cells(csv_file: Path, row: Mapping[str, str]) -> None:
 
 
 def read_results(csv_file: Path) -> pandas.DataFrame:
-    """The rows as a pandas table, numbers as numbers."""
+    """The rows as a pandas table: numbers as numbers, NaN for what is missing.
+
+    A torn last line is left out. Raises ResultsError for any other damage, and for a cell that is
+    no number where one is expected.
+    """
     import pandas
 
-    try:
-        return pandas.read_csv(csv_file)
-    except (OSError, ValueError) as error:
-        raise ResultsError(f"results {str(csv_file)!r}: cannot be read: {error}") from error
+    rows = [row for _, row in whole_lines(csv_file) if row is not None]
+    texts = pandas.DataFrame(rows, columns=list(COLUMNS), dtype="object")
+    texts = texts.where(texts != "")
+    values = {
+        name: texts[name] if column.words else _numbers(texts[name], csv_file)
+        for name, column in COLUMNS.items()
+    }
+    return pandas.DataFrame(values)
+
+
+def _numbers(texts: pandas.Series, csv_file: Path) -> pandas.Series:
+    """The numbers of a column, which stand there as text."""
+    import pandas
+
+    numbers = pandas.to_numeric(texts, errors="coerce")
+    wrong = texts[numbers.isna() & texts.notna()]
+    if len(wrong):
+        raise ResultsError(
+            f"results {str(csv_file)!r}: line {wrong.index[0] + 2}: {texts.name} is "
+            f"{wrong.iloc[0]!r}, expected a number"
+        )
+    return numbers

@@ -7,16 +7,13 @@ from __future__ import annotations
 
 import csv
 import io
-import json
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
 from cavsumo.assertions.base import HELD, VIOLATED
-from cavsumo.results.columns import COLUMNS
-
-Row = dict[str, Any]
+from cavsumo.results.columns import COLUMNS, Row
 
 
 @dataclass(frozen=True)
@@ -32,11 +29,6 @@ class Outcome:
     row: Row
     trace: str = ""
     ego_log: str = ""
-
-    @property
-    def frames(self) -> list[dict[str, Any]]:
-        """The frames of the trace (parsed anew at each call)."""
-        return [json.loads(line) for line in self.trace.splitlines()[1:]]
 
 
 def cell(value: Any) -> str:
@@ -57,11 +49,6 @@ def row_line(row: Mapping[str, Any]) -> str:
     cells = [cell(row.get(column)) for column in COLUMNS]
     csv.writer(line, lineterminator="\n").writerow(cells)
     return line.getvalue()
-
-
-def verdicts_cell(verdicts: Mapping[str, str]) -> str:
-    """What every assertion said, as it stands in the CSV."""
-    return " ".join(f"{name}={verdict}" for name, verdict in verdicts.items())
 
 
 def verdicts_of(row: Mapping[str, Any]) -> dict[str, str]:

@@ -22,9 +22,9 @@ from cavsumo.model.documents import json_of, read_text
 from cavsumo.model.scenario import BatchPlan
 from cavsumo.model.snapshot import BodyState, Snapshot
 from cavsumo.network.site import Site
-from cavsumo.results.columns import COLUMNS
-from cavsumo.results.provenance import EXTENT, checksums, traffic_checksum, versions
-from cavsumo.results.rows import Row, cell
+from cavsumo.results.columns import COLUMNS, Row
+from cavsumo.results.provenance import EXTENT, traffic_checksum, versions
+from cavsumo.results.rows import cell
 from cavsumo.results.schema import check_frame, check_head, check_row
 from cavsumo.sumo.options import OPTIONS
 
@@ -70,15 +70,14 @@ class Trace:
         }
 
 
-def origin(plan: BatchPlan, site: Site, inputs: Mapping[str, str] | None = None) -> dict[str, Any]:
+def origin(plan: BatchPlan, site: Site, inputs: Mapping[str, str]) -> dict[str, Any]:
     """What the episodes of a plan have in common, for the heads of their traces.
 
-    ``inputs``: the checksums of its files if they are known; what they are now if not.
+    ``inputs``: the checksums of its files.
     """
-    known = checksums(plan) if inputs is None else dict(inputs)
     return {
         "plan": plan.model_dump(mode="json", exclude=set(MANNER)),
-        "sha256": known | traffic_checksum(site),
+        "sha256": dict(inputs) | traffic_checksum(site),
         "versions": versions(),
         "sumo_options": dict(OPTIONS),
     }

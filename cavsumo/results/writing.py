@@ -22,7 +22,7 @@ from pathlib import Path
 from typing import Any
 
 from cavsumo.errors import BatchError, ResultsError
-from cavsumo.results.columns import COLUMNS
+from cavsumo.results.columns import COLUMNS, Row
 from cavsumo.results.reading import (
     FORMAT,
     HEADER,
@@ -32,7 +32,7 @@ from cavsumo.results.reading import (
     trace_name,
     whole_lines,
 )
-from cavsumo.results.rows import Outcome, Row, row_line
+from cavsumo.results.rows import Outcome, row_line
 
 RUNNING = "running"
 UNENCODABLE = "backslashreplace"  # file names may hold what is no Unicode
@@ -257,7 +257,8 @@ class Recorder:
 
     def _write_manifest(self, status: str) -> None:
         """Replace the manifest, all at once."""
-        data = {"format": FORMAT, "status": status, **self.manifest, "columns": dict(COLUMNS)}
+        columns = {name: column.explanation for name, column in COLUMNS.items()}
+        data = {"format": FORMAT, "status": status, **self.manifest, "columns": columns}
         text = json.dumps(data, indent=1, ensure_ascii=False, allow_nan=False)
         new = self.manifest_file.with_name(f".{self.manifest_file.name}.new")
         try:

@@ -16,7 +16,7 @@ from cavsumo.agents.base import Agent, Forecast
 from cavsumo.assertions.base import INVALID, VIOLATED, Assertion, Judgement, weightiest
 from cavsumo.assertions.blame import blamed
 from cavsumo.assertions.contacts import ContactMonitor
-from cavsumo.assertions.criticality_monitor import CriticalityMonitor
+from cavsumo.assertions.criticality_monitor import CriticalityMonitor, Extremes
 from cavsumo.assertions.naturalness import Naturalness
 from cavsumo.assertions.validity import Breach, ValidityMonitor
 from cavsumo.egos.base import Drive, Ego
@@ -29,6 +29,7 @@ from cavsumo.model.scene import Scene
 from cavsumo.model.seeds import starts_generator
 from cavsumo.model.sensors import Senses
 from cavsumo.model.snapshot import BodyState, Snapshot
+from cavsumo.simulation.ego_progress import EgoProgress, ego_progress
 from cavsumo.simulation.rewards import Feedback, RewardMonitor
 from cavsumo.simulation.setup import Setup
 
@@ -60,6 +61,8 @@ class Episode:
     blame: str = ""
     rms_acceleration: float = 0.0
     criticality: CriticalityMonitor = field(default_factory=CriticalityMonitor)
+    extremes: Extremes = field(default_factory=Extremes)
+    progress: EgoProgress = field(default_factory=EgoProgress)
     cost: float = 0.0
     reward: float = 0.0
     sumo_collisions: frozenset[tuple[str, str]] = frozenset()
@@ -110,7 +113,8 @@ class EpisodeLoop:
         self._episode = Episode(Judgement(""))
         self._episode.forecast = _foretold(agents, self.agent_views)
         self._validity = ValidityMonitor(self.scene)
-        self._history: list[Snapshot] = []  # what the blame is found from
+        self._history: list[Snapshot] = []  # what blame and progress are found from
+        self._arrived = False
         self._learners = any(type(a).process_feedback is not Agent.process_feedback for a in agents)
         self._observe(self.snapshot)
         self._end(_over(setup, self.snapshot))
@@ -130,6 +134,7 @@ class EpisodeLoop:
             episode.actions.append(actions)
         successor = setup.world.step(states, command)
         if successor is None or (episode.drives and _at_end(scene, successor)):
+            self._arrived = True
             self._end(True)
             rewards = self._rewards.lost()
             _feed_back(agents, views, actions, rewards, views)
@@ -169,6 +174,9 @@ class EpisodeLoop:
             episode.steps, self.scene.dt
         )
         spoilt = self._validity.spoils(episode.judgement)
+        late = self.snapshot.time >= self._setup.scenario.end - 1e-9
+        arrived = True if self._arrived else False if late else None
+        episode.progress = ego_progress(self.scene, self._history, arrived)
         episode.invalid, episode.breach = spoilt is not None, spoilt or self._validity.first
         if episode.outcome == VIOLATED:
             episode.blame = blamed(self.scene, self._history, episode.judgement)
@@ -229,21 +237,22 @@ def _reset(
     """Draw the starts and begin an episode; one generator for each who draws."""
     streams = np.random.SeedSequence(seed)
     _, electing, *rest = map(np.random.default_rng, streams.spawn(2 + len(agents)))
-    placing = starts_generator(seed if setup.starts_seed is None else setup.starts_seed)
+    scenario = setup.scenario
+    placing = starts_generator(seed if scenario.starts_seed is None else scenario.starts_seed)
     kinds = [body.kind for body in setup.bodies]
     ego = setup.world.ego_body
-    starts = setup.site.draw(kinds, ego.kind, setup.start_speed, placing)
+    starts = setup.site.draw(kinds, ego.kind, scenario.start_speed, placing)
     watching: list[Ego | Agent | Assertion] = [setup.ego, *agents, *setup.assertions]
     # Vehicles keep their distance to whoever is ahead of them, so they see everybody.
     driving = any(start.approach for start in starts)
-    everything = record or driving or bool(setup.ego_sensor or setup.tester_sensor)
+    everything = record or driving or bool(scenario.ego_sensor or scenario.tester_sensor)
     everything = everything or any(who.sees_background for who in watching)
     snapshot = setup.world.reset(
         seed, _states(setup, starts), starts, everything=everything, simulation=simulation
     )
     starts, snapshot = _cleared(setup, starts, snapshot, placing)
     scene = setup.site.scene(setup.world.dt, ego, setup.bodies, starts, seed)
-    scene = dataclasses.replace(scene, horizon=setup.horizon)
+    scene = dataclasses.replace(scene, horizon=scenario.end)
     senses = _senses(setup, scene, streams)
     for agent, team, rng in zip(agents, setup.teams, rest, strict=True):
         agent.reset(scene, team, rng)
@@ -281,19 +290,22 @@ def _senses(setup: Setup, scene: Scene, streams: np.random.SeedSequence) -> Sens
 
     Their generators come after all others, which are the same with sensors and without.
     """
-    if not (setup.ego_sensor or setup.tester_sensor):
+    ego, testers = setup.scenario.ego_sensor, setup.scenario.tester_sensor
+    if not (ego or testers):
         return None
     seeds = streams.spawn(1 + len(setup.teams))
-    return Senses(scene, setup.ego_sensor, setup.tester_sensor, setup.teams, seeds)
+    return Senses(scene, ego, testers, setup.teams, seeds)
 
 
 def _states(setup: Setup, starts: Sequence[Start]) -> list[BodyState]:
     """The testers' first states."""
 
+    wanted = setup.scenario.start_speed
+
     def speed(kind: Kind, start: Start) -> float:
         if start.v is not None:
             return start.v
-        return kind.v_max if setup.start_speed is None else min(kind.v_max, setup.start_speed)
+        return kind.v_max if wanted is None else min(kind.v_max, wanted)
 
     return [
         BodyState(body, start.x, start.y, speed(body.kind, start), start.o)
@@ -360,7 +372,7 @@ def _over(setup: Setup, snapshot: Snapshot) -> bool:
             break
     else:
         return True
-    left = setup.horizon - snapshot.time
+    left = setup.scenario.end - snapshot.time
     if left > 1e-9:
         return False
     return left < -OVERTIME_S or not any(a.pending for a in setup.assertions)
@@ -379,6 +391,7 @@ def _finished(
     episode.judgement = weightiest(setup.assertions)
     episode.verdicts = {a.name: a.judgement.verdict for a in setup.assertions}
     episode.steps, episode.time = snapshot.step, snapshot.time
+    episode.extremes = episode.criticality.extremes()
     episode.cost, episode.reward = rewards.cost, rewards.total
     world = setup.world
     episode.sumo_collisions = frozenset(world.collisions)

@@ -11,7 +11,6 @@ from cavsumo.egos import make_ego
 from cavsumo.egos.base import Ego, Mission
 from cavsumo.model.bodies import Body
 from cavsumo.model.scenario import Scenario
-from cavsumo.model.sensors import Sensor
 from cavsumo.network.site import Site
 from cavsumo.sumo.world import World
 
@@ -21,33 +20,25 @@ class Setup:
     """All that episodes of one scenario share.
 
     Attributes:
-        world, site, ego, assertions: as built from the scenario.
+        scenario: what is simulated.
+        world, site, ego, assertions: as built from it.
         teams: the agents' bodies: for each agent the indices of those it owns.
         bodies: the testers' bodies.
-        horizon: length of an episode [s].
-        start_speed: of the testers [m/s]; None for their maximum.
-        starts_seed: of the episode whose starts all episodes have; None for their own.
-        ego_sensor, tester_sensor: what the ego and the agents see the others through; None for
-            full observability.
     """
 
+    scenario: Scenario
     world: World
     site: Site
     ego: Ego
     assertions: tuple[Assertion, ...]
     teams: tuple[tuple[int, ...], ...]
     bodies: tuple[Body, ...]
-    horizon: float
-    start_speed: float | None = None
-    starts_seed: int | None = None
-    ego_sensor: Sensor | None = None
-    tester_sensor: Sensor | None = None
 
     @property
     def mission(self) -> Mission:
         """What the ego may know beforehand."""
-        site, route = self.site, self.site.route
-        return Mission(site.net, route.edges, route.path, site.lights, self.world.dt, self.horizon)
+        site, route, horizon = self.site, self.site.route, self.scenario.end
+        return Mission(site.net, route.edges, route.path, site.lights, self.world.dt, horizon)
 
     def close(self) -> None:
         """End the ego and the simulation."""
@@ -59,6 +50,7 @@ def make_setup(scenario: Scenario, site: Site, ego: Ego | None = None) -> Setup:
     """The setup of a scenario, with an ego of its own unless one is given."""
     ego = ego or make_ego(scenario.ego, scenario.ego_params)
     return Setup(
+        scenario=scenario,
         world=World(scenario, site, ego),
         site=site,
         ego=ego,
@@ -70,9 +62,4 @@ def make_setup(scenario: Scenario, site: Site, ego: Ego | None = None) -> Setup:
         ),
         teams=teams(scenario),
         bodies=tester_bodies(scenario),
-        horizon=scenario.end,
-        start_speed=scenario.start_speed,
-        starts_seed=scenario.starts_seed,
-        ego_sensor=scenario.ego_sensor,
-        tester_sensor=scenario.tester_sensor,
     )

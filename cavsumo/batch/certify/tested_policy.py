@@ -13,9 +13,10 @@ from pathlib import Path
 from typing import Any
 
 from cavsumo.agents import AGENTS
-from cavsumo.agents.casting import learners, teams, tester_bodies
-from cavsumo.agents.policy import parameters_of, policy_file
+from cavsumo.agents.casting import params_of, resolve_cast, teams, tester_bodies
+from cavsumo.agents.policy import policy_file
 from cavsumo.agents.recorded import action_between
+from cavsumo.batch.jobs import Memory
 from cavsumo.batch.preflight import recorded_settings
 from cavsumo.batch.replay import Record, known, prepared_again, replayed
 from cavsumo.batch.worker import Worker
@@ -23,10 +24,7 @@ from cavsumo.errors import InputError, ResultsError, UnknownName
 from cavsumo.model.labels import cast_of
 from cavsumo.model.scenario import BatchPlan, Params
 from cavsumo.results.provenance import EXTENT
-from cavsumo.results.traces import Trace, parsed
-
-Memory = tuple[Any, ...]
-
+from cavsumo.results.traces import Trace
 
 # Settings of results that are not the test's: which agents, against whom, how often, how kept.
 OTHERS = EXTENT - {"deadline_s"} | {
@@ -76,7 +74,7 @@ def of_run(record: Record, params: Params, *, kept: bool, open_loop: bool) -> Su
         memory = {again: actions_of(_trace(record), plan)}
         return Subject(f"{words}, open loop", f"{again}=recorded", {}, memory, *own)
     memory = {label: found} if (found := _known_before(record)) is not None else {}
-    return Subject(words, _word(plan, label), _params(plan, label) | params, memory, *own)
+    return Subject(words, _word(plan, label), params_of(plan, label) | params, memory, *own)
 
 
 def of_policy(
@@ -89,7 +87,7 @@ def of_policy(
         after = manifest.get("learned_after", {}).get(word)
         when = "" if after is None or not memory else f", as it knew after run {after}"
         words = f"agent {word} of {file}{when}"
-        return Subject(words, _word(plan, word), _params(plan, word) | params, memory)
+        return Subject(words, _word(plan, word), params_of(plan, word) | params, memory)
     try:
         ((_, name),) = cast_of((word,)).items()
     except ValueError as error:
@@ -140,18 +138,13 @@ def _word(plan: BatchPlan, label: str) -> str:
     return label if plan.cast[label] == label else f"{label}={plan.cast[label]}"
 
 
-def _params(plan: BatchPlan, label: str) -> Params:
-    """The parameters of an agent."""
-    return plan.agent_params(label, [p.name for p in parameters_of(plan.cast[label])])
-
-
 def _known_before(record: Record) -> Memory | None:
     """What an agent knew before an episode: from its trace, or by living through its earlier ones.
 
     Plain agents know nothing.
     """
     plan, label = record.plan, record.row["agent"]
-    if label not in learners(plan):
+    if label not in resolve_cast(plan).learners:
         return (plan.known or {}).get(label)
     if record.trace is not None and record.trace.head.get("memory_kept"):
         memory = record.trace.head["memory"]
@@ -166,9 +159,9 @@ def _trace(record: Record) -> Trace:
         return record.trace
     with Worker(prepared_again(record)) as worker:
         again = replayed(worker, record)
-    if not again.trace:
+    if again.trace is None:
         raise InputError(f"--open-loop: run {record.run} ended in an error: it has no actions")
-    return parsed(again.trace)
+    return again.trace
 
 
 def actions_of(trace: Trace, plan: BatchPlan) -> Memory:

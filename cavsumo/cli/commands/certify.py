@@ -26,11 +26,12 @@ from cavsumo.batch.certify.ego_list import Egos, choices, opponents
 from cavsumo.batch.certify.tested_policy import Subject, of_policy, of_run, settings_of
 from cavsumo.batch.certify.used_seeds import Used, fresh_seed, used
 from cavsumo.batch.executors import Means
+from cavsumo.batch.playing import played
 from cavsumo.batch.preflight import CheckedBatch, Manner, checked
 from cavsumo.batch.prepared import PreparedBatch
 from cavsumo.batch.replay import Record, prepared_again, recorded, recorded_plan
 from cavsumo.batch.trust import check_trust
-from cavsumo.cli.commands.run import exit_status, played
+from cavsumo.cli.commands.run import announce, exit_status
 from cavsumo.egos import make_ego
 from cavsumo.errors import Exit, InputError
 from cavsumo.model.bodies import kind_named
@@ -108,7 +109,7 @@ def certify(order: CertifyOptions) -> int:
         _warn(manifest, batches[0].prepared, record, seeds, subject)
         if not order.quiet:
             print(_first_lines(order, subject, seeds, seed), file=sys.stderr)
-        ended, interrupted = played(batches, means, manner)
+        ended, interrupted = played(batches, means, manner, announce)
         if interrupted:
             left = " --resume goes on" if order.output else ""
             print(f"cavsumo: interrupted, so nothing is certified;{left}", file=sys.stderr)

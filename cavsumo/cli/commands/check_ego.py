@@ -67,7 +67,7 @@ def _in_sumo(settings: Mapping[str, Any], deadline: float) -> str:
     quiet = {**settings, "trace": "none", "reference": "none", "runs": 1, "deadline_s": deadline}
     prepared = prepare(plan_from(quiet, "check-ego"))
     with Worker(prepared) as worker:
-        rows = [worker.play(job(prepared.plan, 0))[0].row for _ in range(EPISODES)]
+        rows = [worker.play(job(prepared.plan, 0)).outcome.row for _ in range(EPISODES)]
     for row in rows:
         assert row["outcome"] != "error", row["error"]
     for column in (c for c in COLUMNS if c != "wall_s"):

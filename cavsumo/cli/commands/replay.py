@@ -22,7 +22,7 @@ from cavsumo.errors import Exit, InputError
 from cavsumo.interop.fcd import write_fcd
 from cavsumo.network.site import Site
 from cavsumo.results.provenance import changes
-from cavsumo.results.traces import Trace, parsed
+from cavsumo.results.traces import Trace
 
 TRACE = ".jsonl"  # how the name of a trace ends
 
@@ -113,7 +113,7 @@ def _played(prepared: PreparedBatch, record: Record) -> Trace | None:
     compared = f"{len(frames)} frames" if frames is not None else "its row (no trace was kept)"
     row = record.row
     print(f"run {record.run} ({row['agent']}): {row['outcome']}, {compared}: the same")
-    return parsed(again.trace) if again.trace else None
+    return again.trace
 
 
 def _show(site: Site, record: Record, trace: Trace, wanted: ReplayOptions) -> None:

@@ -7,8 +7,6 @@ import dataclasses
 from pathlib import Path
 from typing import Any
 
-from cavsumo.cli.scenario_settings import assignment
-
 
 def add_certify(commands: Any) -> None:
     """The command certify."""
@@ -126,6 +124,7 @@ def _add_output(group: Any) -> None:
 
 def _certify(options: argparse.Namespace) -> int:
     from cavsumo.cli.commands.certify import CertifyOptions, certify
+    from cavsumo.cli.setting_options import assignment
 
     given = {f.name: getattr(options, f.name) for f in dataclasses.fields(CertifyOptions)}
     given["egos"] = tuple(word for words in options.egos or () for word in words)

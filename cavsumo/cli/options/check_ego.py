@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import argparse
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from cavsumo.cli.scenario_settings import assignment
+if TYPE_CHECKING:
+    from cavsumo.model.scenario.fields import Setting
 
 
 def add_check_ego(commands: Any) -> None:
@@ -18,22 +19,31 @@ def add_check_ego(commands: Any) -> None:
         "what passes and what does not.",
         allow_abbrev=False,
     )
+    check.fill = _fill
+    check.set_defaults(command=_check_ego)
+
+
+def _fill(check: argparse.ArgumentParser) -> None:
+    """Add the options; some are settings of a scenario."""
+    from cavsumo.cli.setting_options import add_setting, meaning
+
     add = check.add_argument
     add("ego", metavar="SPEC", help="as for run --ego: a name, module:Class, exec:..., tcp:...")
-    add("-n", "--net", required=True, metavar="NET", help="where it drives, as for run")
-    add("--ego-param", action="append", default=[], metavar="KEY=VALUE", help="repeat for several")
-    add("--step-length", type=float, default=0.1, metavar="S", help="timestep [s] (default 0.1)")
+    for setting in _settings():
+        must = {"required": True, "help": meaning(setting)} if setting.key == "net" else {}
+        add_setting(add, setting, **must)
     add("--deadline", type=float, default=60.0, metavar="S", help="of each check [s] (default 60)")
-    check.set_defaults(command=_check_ego)
+
+
+def _settings() -> list[Setting]:
+    """The settings of a scenario that matter to an ego alone."""
+    from cavsumo.model.scenario.fields import settings
+
+    return [s for s in settings() if s.key in ("net", "ego_params", "step_length")]
 
 
 def _check_ego(options: argparse.Namespace) -> int:
     from cavsumo.cli.commands.check_ego import check_ego
+    from cavsumo.cli.setting_options import given
 
-    settings = {
-        "net": options.net,
-        "ego": options.ego,
-        "ego_params": dict(assignment("--ego-param", word) for word in options.ego_param),
-        "step_length": options.step_length,
-    }
-    return check_ego(settings, options.deadline)
+    return check_ego({"ego": options.ego, **given(options, _settings())}, options.deadline)

@@ -105,7 +105,8 @@ def _replay(options: argparse.Namespace) -> int:
 
 
 def _report(options: argparse.Namespace) -> int:
-    from cavsumo.cli.commands.report import ReportOptions, report
+    from cavsumo.cli.commands.report import report
+    from cavsumo.report.files import ReportOptions
 
     names = [field.name for field in dataclasses.fields(ReportOptions)]
     return report(

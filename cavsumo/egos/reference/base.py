@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from cavsumo.egos.reference.encounter import Encounter
+from cavsumo.egos.reference.names import REFERENCE_NAMES
 from cavsumo.model.bodies import Kind
 from cavsumo.model.registry import Registry
 
@@ -41,7 +42,7 @@ class Reference:
         return (self.speed_lost(elapsed, kind) - self.speed_lost(elapsed + dt, kind)) / dt
 
 
-REFERENCES: Registry[Reference] = Registry("reference driver")
+REFERENCES: Registry[Reference] = Registry(REFERENCE_NAMES)
 
 
 def ramped(elapsed: float, delay: float, rise: float, full: float) -> float:

@@ -1,1 +1,1 @@
-"""A junction from above: its surfaces as shapes, what is drawn of them, the picture."""
+"""A place from above: ``place`` says what is drawn of it, ``picture`` writes it into a file."""

@@ -1,4 +1,4 @@
-"""What is drawn of a junction: its surfaces, crossings, the ego's routes, where testers start."""
+"""A junction's picture, layer by layer: the place, the ego's routes, where testers start."""
 
 from __future__ import annotations
 
@@ -14,30 +14,21 @@ from matplotlib.ft2font import FT2Font
 from matplotlib.patches import FancyArrowPatch, PathPatch
 from matplotlib.path import Path as Outline
 from matplotlib.patheffects import withStroke
-from shapely.geometry import LineString
+from shapely.geometry import LineString, Polygon
 
 from cavsumo.model.polyline import Path as Polyline
-from cavsumo.network.drawing.surfaces import (
-    beside,
-    crossings,
-    junctions,
-    lane_kind,
-    lanes_by_kind,
-    markings,
-    stripes,
-    walking_areas,
-)
-from cavsumo.network.facts import PRIORITY, SIGNALS
-from cavsumo.network.inspection import InspectedNetwork, Way
-from cavsumo.network.reader import street
+from cavsumo.network.drawing.place import COLOURS, DrawnPlace, StreetName, View
+from cavsumo.network.drawing.surfaces import beside
+from cavsumo.network.inspection import Way
 
-Box = tuple[float, float, float, float]  # west, south, east, north [m]
-
-GROUND, ROAD, OTHER, PAVEMENT, WALKING = "#eef1ea", "#8b9096", "#b49a7c", "#d9d4c7", "#c9c2b0"
-LANES = {"road": ROAD, "other": OTHER, "pavement": PAVEMENT}
 TURNS = {"straight": "#1b7837", "left": "#2166ac", "right": "#d6604d", "u-turn": "#762a83"}
 AREA, AREA_EDGE = "#f5b301", "#a87400"
-CROSSING_LINES: dict[str, Any] = {"color": "white", "lw": 1.6, "ls": (0, (1.2, 0.8))}
+HEIGHTS = {"road": 1.0, "other": 2.0, "pavement": 2.0, "walking": 3.0, "stripes": 4.0}
+STROKES: dict[str, dict[str, Any]] = {
+    "solid": {"lw": 0.7, "zorder": 2.5},
+    "dashed": {"lw": 0.7, "ls": (0, (6, 6)), "zorder": 2.5},
+    "borders": {"lw": 1.6, "ls": (0, (1.2, 0.8)), "zorder": 4},
+}
 SIGNAL_DOTS: dict[str, Any] = {
     "marker": "o",
     "ms": 5,
@@ -50,35 +41,29 @@ LETTER = 0.0075  # width of a letter of a street's name, as part of the picture'
 BESIDE_M = {"straight": 0.0, "left": 0.5, "right": -0.5, "u-turn": 1.0}  # routes are drawn apart
 
 
-# Surfaces
+# The place
 
 
-def draw_surfaces(axes: Axes, here: InspectedNetwork, view: Box) -> None:
-    """Junctions, lanes by kind, the lines between them, walking areas, street names."""
-    network, window = here.network, shapely.box(*view)
-    _fill(axes, junctions(network), window, ROAD, 1)
-    for kind, surfaces in lanes_by_kind(network).items():
-        _fill(axes, surfaces, window, LANES[kind], 2)
-    _fill(axes, walking_areas(network), window, WALKING, 3)
-    for border, solid in markings(network):
-        if border.intersects(window):
-            style = "-" if solid else (0, (6, 6))
-            axes.plot(*border.xy, color="white", lw=0.7, ls=style, zorder=2.5)
-    _draw_names(axes, here, window)
+def draw_place(axes: Axes, place: DrawnPlace, view: View) -> None:
+    """Surfaces, the lines on them, crossings with dots at signals, street names."""
+    seen = place.within(view)
+    for role, height in HEIGHTS.items():
+        _fill(axes, seen.areas[role], COLOURS[role], height)
+    for role, style in STROKES.items():
+        for points in seen.lines[role]:
+            axes.plot(*zip(*points, strict=True), color=COLOURS[role], **style)
+    if place.signals:
+        axes.plot(*zip(*place.signals, strict=True), ls="", **SIGNAL_DOTS, zorder=6)
+    _draw_names(axes, place.names, shapely.box(*view))
 
 
-def lane_color(lane: Any) -> str:
-    """The colour of a lane by its kind."""
-    return LANES[lane_kind(lane)]
-
-
-def _draw_names(axes: Axes, here: InspectedNetwork, window: shapely.Geometry) -> None:
+def _draw_names(axes: Axes, names: Sequence[StreetName], window: shapely.Geometry) -> None:
     """Each street's name, where most of it is seen."""
     best: dict[str, LineString] = {}
     letter_m = LETTER * (window.bounds[3] - window.bounds[1])
-    for edge in here.network.edges:
-        name, line = street(edge), _longest(LineString(edge.getShape()).intersection(window))
-        if not name or line is None or line.length <= letter_m * len(name):
+    for name, along in names:
+        line = _longest(along.intersection(window))
+        if line is None or line.length <= letter_m * len(name):
             continue
         if font_for(name) and line.length > getattr(best.get(name), "length", 0):
             best[name] = line
@@ -97,42 +82,17 @@ def _longest(shape: shapely.Geometry) -> LineString | None:
     return max(lines, key=lambda line: line.length, default=None)
 
 
-def draw_crossings(axes: Axes, here: InspectedNetwork, view: Box) -> None:
-    """Zebra stripes where pedestrians have priority, two lines elsewhere, dots at signals."""
-    window = shapely.box(*view)
-    for axis, half, right in crossings(here.network):
-        if not axis.intersects(window):
-            continue
-        if right == PRIORITY:
-            _fill(axes, stripes(axis, half), window, "white", 4)
-            continue
-        for border in filter(None, (beside(axis, -half), beside(axis, half))):
-            axes.plot(*border.xy, **CROSSING_LINES, zorder=4)
-        if right == SIGNALS:
-            axes.plot(
-                *zip(axis.coords[0], axis.coords[-1], strict=True), ls="", **SIGNAL_DOTS, zorder=6
-            )
-
-
 def _fill(
-    axes: Axes,
-    shapes: Iterable[shapely.Geometry],
-    window: shapely.Geometry,
-    color: str,
-    z: float,
-    **style: Any,
+    axes: Axes, rings: Iterable[Sequence[Any]], color: str, height: float, **style: Any
 ) -> None:
-    """Fill polygons, those that are in the picture, as one patch."""
+    """Fill polygons as one patch, each ring anticlockwise, so that none is a hole of another."""
     outline = [
-        ring.coords
-        for shape in shapes
-        for part in getattr(shape, "geoms", [shape])
-        if part.geom_type == "Polygon" and part.intersects(window)
-        for ring in [shapely.geometry.polygon.orient(part).exterior]
+        Outline(shapely.geometry.polygon.orient(Polygon(ring)).exterior.coords, closed=True)
+        for ring in rings
     ]
     if outline:
-        path = Outline.make_compound_path(*(Outline(list(ring), closed=True) for ring in outline))
-        axes.add_patch(PathPatch(path, **{"facecolor": color, "lw": 0, "zorder": z} | style))
+        path = Outline.make_compound_path(*outline)
+        axes.add_patch(PathPatch(path, **{"facecolor": color, "lw": 0, "zorder": height} | style))
 
 
 # The test
@@ -147,8 +107,9 @@ def draw_areas(axes: Axes, ways: Sequence[Way]) -> None:
             for a in way.areas
         ]
     )
+    rings = [part.exterior.coords for part in getattr(everywhere, "geoms", [everywhere])]
     style = {"alpha": 0.75, "hatch": "////", "edgecolor": AREA_EDGE, "lw": 0.5}
-    _fill(axes, [everywhere], everywhere.envelope, AREA, 5, **style)
+    _fill(axes, [ring for ring in rings if len(ring) > 0], AREA, 5, **style)
 
 
 def draw_routes(axes: Axes, ways: Sequence[Way]) -> None:

@@ -15,31 +15,21 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
-from shapely.geometry import LineString
 
 from cavsumo.errors import InputError
 from cavsumo.network.drawing.layers import (
     AREA,
     AREA_EDGE,
-    GROUND,
-    OTHER,
-    PAVEMENT,
-    ROAD,
     SIGNAL_DOTS,
     TURNS,
-    WALKING,
-    Box,
     draw_areas,
-    draw_crossings,
+    draw_place,
     draw_routes,
-    draw_surfaces,
     font_for,
-    lane_color,
 )
-from cavsumo.network.drawing.surfaces import credit
+from cavsumo.network.drawing.place import COLOURS, GROUND, DrawnPlace, View, place_drawn
 from cavsumo.network.facts import NONE, PRIORITY, SIGNALS, right_of_way
 from cavsumo.network.inspection import InspectedNetwork, Junction, Way
-from cavsumo.network.reader import lane_shape
 
 MARGIN_M = 12.0  # around the routes
 HEIGHT_IN, DPI = 9.0, 150
@@ -47,6 +37,12 @@ CROSSING_LABELS = {
     SIGNALS: "crossings at traffic lights",
     PRIORITY: "crossings with priority",
     NONE: "crossings without priority",
+}
+SURFACE_LABELS = {
+    "road": "lanes for cars",
+    "other": "other lanes",
+    "pavement": "pavements",
+    "walking": "walking areas",
 }
 
 
@@ -56,25 +52,29 @@ def draw(here: InspectedNetwork, junction: Junction | None, file: Path) -> list[
     Returns the names of its streets that no font here can write.
     """
     ways = junction.ways if junction else ()
-    view = _view(here, ways)
+    place = place_drawn(here.network, [way.route.path for way in ways])
+    view = _view(place)
     ratio = min(2.0, max(0.7, (view[2] - view[0]) / (view[3] - view[1])))
     figure = Figure(figsize=(HEIGHT_IN * ratio, HEIGHT_IN), dpi=DPI)
     axes = figure.add_subplot()
     axes.set(xlim=view[::2], ylim=view[1::2], aspect="equal", xticks=[], yticks=[])
     axes.set_facecolor(GROUND)
-    draw_surfaces(axes, here, view)
-    draw_crossings(axes, here, view)
+    draw_place(axes, place, view)
     draw_areas(axes, ways)
     draw_routes(axes, ways)
     _draw_scale(axes, view)
-    source = credit(here.network.file)
-    if source:
-        axes.text(0.995, 0.01, source, transform=axes.transAxes, ha="right", fontsize=7, zorder=11)
+    if place.credit:
+        axes.text(
+            0.995, 0.01, place.credit, transform=axes.transAxes, ha="right", fontsize=7, zorder=11
+        )
     title, name = _titles(here, junction)
     axes.set_title(f"{title}\n", loc="left", font=font_for(title), size=13)
     axes.text(0, 1.012, name, transform=axes.transAxes, fontsize=8, color="#444444")
     axes.legend(
-        handles=_legend(here, ways), loc="upper left", bbox_to_anchor=(1.0, 1.0), frameon=False
+        handles=_legend(here, place, ways),
+        loc="upper left",
+        bbox_to_anchor=(1.0, 1.0),
+        frameon=False,
     )
     dated = file.suffix.lower() in (".svg", ".pdf")  # the same picture is the same bytes
     metadata = {"Date" if file.suffix.lower() == ".svg" else "CreationDate": None} if dated else {}
@@ -85,17 +85,15 @@ def draw(here: InspectedNetwork, junction: Junction | None, file: Path) -> list[
     return [name for name in (junction.streets if junction else ()) if not font_for(name)]
 
 
-def _view(here: InspectedNetwork, ways: Sequence[Way]) -> Box:
-    """What to show: the routes and what lies around them."""
-    paths = [LineString(way.route.path.points) for way in ways]
-    shown = paths or [
-        LineString(lane_shape(lane)) for e in here.network.edges for lane in e.getLanes()
-    ]
+def _view(place: DrawnPlace) -> View:
+    """What to show: the routes and what lies around them, else the whole network."""
+    lanes = [*place.areas["road"], *place.areas["other"], *place.areas["pavement"]]
+    shown = place.lines["route"] or lanes
     west, south, east, north = shapely.total_bounds(shown).tolist()
     return west - MARGIN_M, south - MARGIN_M, east + MARGIN_M, north + MARGIN_M
 
 
-def _draw_scale(axes: Axes, view: Box) -> None:
+def _draw_scale(axes: Axes, view: View) -> None:
     """A bar of a round length, about a fifth of the picture, in a corner."""
     wanted = (view[2] - view[0]) / 5
     unit = 10 ** math.floor(math.log10(wanted))
@@ -125,7 +123,7 @@ def _titles(here: InspectedNetwork, junction: Junction | None) -> tuple[str, str
     return " / ".join(names) or ids, f"{ids}, {file}"
 
 
-def _legend(here: InspectedNetwork, ways: Sequence[Way]) -> list[Any]:
+def _legend(here: InspectedNetwork, place: DrawnPlace, ways: Sequence[Way]) -> list[Any]:
     """What the colours mean, as far as they occur."""
     handles: list[Any] = []
     if ways:
@@ -143,19 +141,22 @@ def _legend(here: InspectedNetwork, ways: Sequence[Way]) -> list[Any]:
     for right, label in CROSSING_LABELS.items():
         if right in rights:
             handles.append(_crossing_handle(right, label))
-    kinds = {lane_color(lane) for edge in here.network.edges for lane in edge.getLanes()}
-    named = {ROAD: "lanes for cars", OTHER: "other lanes", PAVEMENT: "pavements"}
-    handles += [Patch(color=c, label=label) for c, label in named.items() if c in kinds]
-    if here.network.inside("walkingarea"):
-        handles.append(Patch(color=WALKING, label="walking areas"))
-    return handles
+    return handles + [
+        Patch(color=COLOURS[role], label=label)
+        for role, label in SURFACE_LABELS.items()
+        if place.areas[role]
+    ]
 
 
 def _crossing_handle(right: str, label: str) -> Any:
     """A crossing in the legend."""
     if right == PRIORITY:
-        return Patch(facecolor=ROAD, hatch="|||", edgecolor="white", lw=0, label=label)
+        return Patch(facecolor=COLOURS["road"], hatch="|||", edgecolor="white", lw=0, label=label)
     if right == SIGNALS:
         style = {key: value for key, value in SIGNAL_DOTS.items() if key != "color"}
-        return Line2D([], [], lw=9, **style, mfc=SIGNAL_DOTS["color"], color=ROAD, label=label)
-    return Line2D([], [], lw=9, color=ROAD, marker="_", mec="white", mew=2, ms=14, label=label)
+        return Line2D(
+            [], [], lw=9, **style, mfc=SIGNAL_DOTS["color"], color=COLOURS["road"], label=label
+        )
+    return Line2D(
+        [], [], lw=9, color=COLOURS["road"], marker="_", mec="white", mew=2, ms=14, label=label
+    )

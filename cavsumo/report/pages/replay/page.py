@@ -10,7 +10,7 @@ from cavsumo.assertions import ASSERTIONS
 from cavsumo.batch.replay import Record
 from cavsumo.model.geometry import Box
 from cavsumo.model.stopping_zones import Zones, zone_polygons
-from cavsumo.network.reader import read_network
+from cavsumo.network.drawing.place import View, site_drawn
 from cavsumo.network.site import Site
 from cavsumo.report.pages.replay.curves import moment
 from cavsumo.report.pages.replay.facts import facts, headline, marks, verdict
@@ -60,7 +60,7 @@ def episode(record: Record, trace: Trace, site: Site) -> dict[str, Any]:
         "ttc": packed(_or_nothing(c.ttc) for c in curves),
         "marks": marks(record.row),
         "tester": record.row["tester"],
-        "scene": scenery(read_network(site.net), site, _extent(frames, site)),
+        "scene": scenery(site_drawn(site), _extent(frames, site)),
     }
 
 
@@ -112,7 +112,7 @@ def _zones(record: Record, frames: Sequence[Mapping[str, Any]], shape: Shape) ->
         )
 
 
-def _extent(frames: Sequence[Mapping[str, Any]], site: Site) -> tuple[float, float, float, float]:
+def _extent(frames: Sequence[Mapping[str, Any]], site: Site) -> View:
     """What holds everybody at all times, and the ego's route [m]."""
     points = list(site.route.path.points)
     points += [(s[0], s[1]) for frame in frames for _, _, s in states(frame)]

@@ -10,11 +10,9 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
-from cavsumo.network.drawing.surfaces import credit
-from cavsumo.network.reader import read_network
+from cavsumo.network.drawing.place import View, site_drawn
 from cavsumo.report.analysis import Report
 from cavsumo.report.events import Event
-from cavsumo.report.pages.replay.scenery import View, outlines
 from cavsumo.report.pages.report.scenes import BatchPlace
 
 PASSED, FAILED, IMPACT = "passed", "failed", "impact"
@@ -148,10 +146,10 @@ def _map(scene: BatchPlace, spots: Sequence[Spot]) -> Map:
     lines: dict[str, str] = {}
     named = ""
     if scene.site is not None:
-        ground = outlines(read_network(scene.site.net), scene.site, view)
-        areas = {name: _path(parts, view, "Z") for name, parts in ground.areas.items()}
-        lines = {name: _path(parts, view, "") for name, parts in ground.lines.items()}
-        named = credit(scene.site.net)
+        place = site_drawn(scene.site)
+        seen, named = place.within(view), place.credit
+        areas = {role: _path(parts, view, "Z") for role, parts in seen.areas.items()}
+        lines = {role: _path(parts, view, "") for role, parts in seen.lines.items()}
     moved = [dot._replace(x=round(dot.x - west, 2), y=round(north - dot.y, 2)) for dot in dots]
     return Map(
         name=scene.name,

@@ -163,8 +163,10 @@ def told_batches(report: Report) -> Iterator[tuple[str, Facts, str]]:
 
 
 def command(batch: Batch) -> str:
-    """The command that made a batch, empty if it is not known."""
-    words = batch.manifest.get("command")
+    """The command or the Python call that made a batch, empty if it is not known."""
+    words, call = batch.manifest.get("command"), batch.manifest.get("call")
+    if isinstance(call, str):
+        return call
     return shlex.join(map(str, words)) if isinstance(words, list) else ""
 
 

@@ -1,0 +1,98 @@
+"""``RecordedEpisode``: an episode that was played again or kept, as a table and as a page."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from cavsumo.api.display import episode_html, episode_text
+from cavsumo.batch.replay import Record, compare, prepared_again, replayed
+from cavsumo.batch.shown import shown_site
+from cavsumo.batch.worker import Worker
+from cavsumo.errors import InputError
+from cavsumo.network.site import Site
+from cavsumo.results.traces import Trace, states
+
+if TYPE_CHECKING:
+    import pandas
+
+COLUMNS = ("time", "body", "x", "y", "v", "o")
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class RecordedEpisode:
+    """An episode with everybody's way through it.
+
+    Attributes:
+        record: its row and its plan.
+        trace: its frames as they were recorded.
+        site: where it took place.
+    """
+
+    record: Record
+    trace: Trace
+    site: Site
+
+    @property
+    def run(self) -> int:
+        """The number of the episode in its batch."""
+        return self.record.run
+
+    @property
+    def row(self) -> Mapping[str, str]:
+        """The row of the episode, as text."""
+        return self.record.row
+
+    @cached_property
+    def frames(self) -> pandas.DataFrame:
+        """Everybody at every timestep.
+
+        Columns: ``time`` [s]; ``body``, its id: ego, tester0, ... or that of SUMO's traffic; ``x``,
+        ``y`` of its centre [m]; ``v``, its speed [m/s]; ``o``, its heading [rad], anticlockwise
+        from east.
+        """
+        import pandas
+
+        seen = [
+            (frame["time_s"], name, *state)
+            for frame in self.trace.frames
+            for _, name, state in states(frame)
+        ]
+        return pandas.DataFrame(seen, columns=list(COLUMNS))
+
+    def html(self, file: str | os.PathLike[str]) -> None:
+        """Write the episode as one page that any browser plays.
+
+        Raises InputError when the file cannot be written.
+        """
+        from cavsumo.report.pages.replay.page import write_page
+
+        write_page(self.record, self.trace, self.site, Path(file))
+
+    def __repr__(self) -> str:
+        return episode_text(self.record, self.trace)
+
+    def _repr_html_(self) -> str:
+        return episode_html(self.record, self.trace)
+
+
+def played_again(record: Record) -> RecordedEpisode:
+    """An episode once more; raises DivergenceError where it first differs."""
+    prepared = prepared_again(record)
+    with Worker(prepared) as worker:
+        again = replayed(worker, record)
+    compare(record, again)
+    if again.trace is None:
+        raise InputError(f"replay: run {record.run} ended in an error, there is nothing to show")
+    return RecordedEpisode(record, again.trace, prepared.site)
+
+
+def as_recorded(record: Record) -> RecordedEpisode:
+    """An episode as it was recorded; raises InputError when no frame was kept."""
+    if record.trace is None:
+        raise InputError(f"replay: no trace was kept of run {record.run}; it must be played")
+    return RecordedEpisode(record, record.trace, shown_site(record.plan, record.trace))

@@ -1,0 +1,202 @@
+"""``Results``: a batch that was played or lies on disk, as tables, pages and a line of text."""
+
+from __future__ import annotations
+
+import os
+import weakref
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from cavsumo.api.display import ResultsSummary, results_html, results_text
+from cavsumo.api.episodes import RecordedEpisode, as_recorded, played_again
+from cavsumo.batch.replay import located, recorded_plan
+from cavsumo.batch.replay import recorded as find_recorded
+from cavsumo.batch.tally import Tally
+from cavsumo.errors import InputError
+from cavsumo.model.objects import SentObject
+from cavsumo.model.own_folders import OwnFolder
+from cavsumo.model.scenario import BatchPlan, Scenario
+from cavsumo.report.files import ReportOptions, write_report_files
+from cavsumo.results.columns import COLUMNS
+from cavsumo.results.reading import COMPLETE, read_results, whole_lines
+
+if TYPE_CHECKING:
+    import pandas
+
+REPORTS = {".md": "markdown", ".csv": "csv", ".json": "json", ".txt": "table"}
+
+
+class TemporaryFolder:
+    """A temporary folder for results that nobody gave a place.
+
+    It goes with ``close``, with this object, or with the process.
+    """
+
+    def __init__(self) -> None:
+        own = OwnFolder("results")
+        self.path = Path(own.name)
+        self.close = weakref.finalize(self, _remove, own, os.getpid())
+
+
+def _remove(own: OwnFolder, owner: int) -> None:
+    """Remove a folder, unless this process is a fork of its owner."""
+    if os.getpid() == owner:
+        own.close()
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Results:
+    """The results of a batch: what ``cavsumo.run`` returns and ``cavsumo.load`` reads.
+
+    Attributes:
+        file: the results file.
+        trusted: whether a replay may use egos and assertions that only the file names.
+        folder: the temporary folder in which the file lies; None for results with a place.
+        objects: the agents, the ego and the assertions that were given as objects; a replay uses
+            them.
+    """
+
+    file: Path
+    trusted: bool = False
+    folder: TemporaryFolder | None = None
+    objects: tuple[SentObject, ...] = ()
+
+    @cached_property
+    def rows(self) -> pandas.DataFrame:
+        """The episodes, a row each, by the numbers of their runs.
+
+        Numbers are numbers, and NaN stands where a value is missing. ``columns`` says what each
+        column means.
+        """
+        table = read_results(self.file)
+        return table.set_axis(table["run"].rename(None), axis="index")
+
+    @cached_property
+    def columns(self) -> pandas.DataFrame:
+        """The columns of ``rows`` by name: the meaning of each, and the unit of its numbers."""
+        import pandas
+
+        said = [(column.meaning, column.unit) for column in COLUMNS.values()]
+        return pandas.DataFrame(said, index=list(COLUMNS), columns=["meaning", "unit"])
+
+    @property
+    def failures(self) -> pandas.DataFrame:
+        """The rows of failures: preventable ones first, then those that were not judged."""
+        found = self.rows[self.rows["outcome"] == "violated"]
+        order = found["avoidable"].map({1: 0, 0: 2}).fillna(1).sort_values(kind="stable")
+        return found.loc[order.index]
+
+    @property
+    def plan(self) -> BatchPlan:
+        """The scenario, how often it was played, and by which agents."""
+        return self._recorded[0]
+
+    @property
+    def scenario(self) -> Scenario:
+        """The scenario that was played; ``cavsumo.run`` takes it for a network."""
+        return self.plan.scenario
+
+    @property
+    def manifest(self) -> Mapping[str, Any]:
+        """The record that makes the results reproducible: status, files, versions, options."""
+        return self._recorded[1]
+
+    @cached_property
+    def _recorded(self) -> tuple[BatchPlan, dict[str, Any]]:
+        """Plan and manifest."""
+        return recorded_plan(self.file)
+
+    def replay(
+        self,
+        run: int,
+        *,
+        recorded: bool = False,
+        net: str | os.PathLike[str] | None = None,
+        routes: str | os.PathLike[str] | None = None,
+    ) -> RecordedEpisode:
+        """Play an episode again, and check bit for bit that it is the same.
+
+        Args:
+            run: its number.
+            recorded: take the frames that were kept, and play nothing.
+            net, routes: where the network and the routes are now, if not where they were.
+
+        Raises:
+            DivergenceError: the episode departs from its record; the message says where first.
+            InputError: there is no such run, no frame of it was kept, or a file is missing.
+        """
+        found = find_recorded(self.file, run, None if self.trusted else ())
+        if net is not None or routes is not None:
+            found = located(found, _path(net), _path(routes))
+        return as_recorded(found) if recorded else played_again(found)
+
+    def report(self, file: str | os.PathLike[str], *, by: str = "agent", replays: int = 20) -> None:
+        """Write the evidence into a file: rates with intervals, comparisons, times, causes.
+
+        Args:
+            file: ending in .html for a page (with replays in a folder beside it), .md, .csv,
+                .json or .txt for tables, .xml for JUnit.
+            by: the column whose values are summary apart.
+            replays: of a page, how many failures have pages of their own.
+
+        Raises InputError when the file cannot be written.
+        """
+        path = Path(file)
+        if path.suffix == ".html":
+            wanted = ReportOptions(by, html=path, replays=replays)
+        elif path.suffix == ".xml":
+            wanted = ReportOptions(by, junit=path)
+        elif path.suffix in REPORTS:
+            wanted = ReportOptions(by, REPORTS[path.suffix], output=path)
+        else:
+            endings = ", ".join((".html", ".xml", *REPORTS))
+            raise InputError(f"report {str(path)!r}: expected a name that ends in {endings}")
+        write_report_files([self.file], wanted)
+
+    def __len__(self) -> int:
+        return len(self.rows)
+
+    def __repr__(self) -> str:
+        return results_text(self._summary)
+
+    def _repr_html_(self) -> str:
+        return results_html(self._summary)
+
+    @cached_property
+    def _summary(self) -> ResultsSummary:
+        """What is said of them."""
+        tally = Tally()
+        for _, row in whole_lines(self.file):
+            if row is not None:
+                tally.add(row)
+        return ResultsSummary(self.scenario, tally, self.failures, self._place)
+
+    @property
+    def _place(self) -> str:
+        """Where the results lie, and how the batch stands if it is not complete."""
+        status = str(self.manifest.get("status"))
+        words = ["" if self.folder else str(self.file), "" if status in COMPLETE else status]
+        return ", ".join(filter(None, words))
+
+
+def _path(name: str | os.PathLike[str] | None) -> Path | None:
+    """A path, None for none."""
+    return None if name is None else Path(name)
+
+
+def load(file: str | os.PathLike[str], *, trust: bool = False) -> Results:
+    """The results that lie in a file, of ``cavsumo.run`` or the command.
+
+    Args:
+        file: the results file (.csv); its manifest lies beside it.
+        trust: let ``replay`` use an ego or an assertion that only the file names: a command to
+            run, a module to import or an address to connect to.
+
+    Raises InputError when the file or its manifest is missing, foreign or damaged.
+    """
+    results = Results(Path(file), trusted=trust)
+    results.plan, results.rows  # noqa: B018  # what is wrong comes out here
+    return results

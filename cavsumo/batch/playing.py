@@ -1,0 +1,102 @@
+"""Batches that were checked, played one after another: the command and the Python interface."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from concurrent.futures import Executor
+
+from cavsumo.batch.batch_run import BatchRun
+from cavsumo.batch.executors import Means, opened
+from cavsumo.batch.interrupts import Interrupts
+from cavsumo.batch.preflight import CheckedBatch, Manner
+from cavsumo.batch.prepared import PreparedBatch
+from cavsumo.batch.stopping import looks_at_rows
+from cavsumo.batch.summary import Ended
+from cavsumo.batch.worker import try_out
+from cavsumo.egos.ego_files import OutputWatch
+from cavsumo.errors import CavsumoError, InputError
+from cavsumo.results.writing import Recorder
+
+Announce = Callable[[CheckedBatch, int], None]  # given a batch that begins, and the jobs at a time
+
+
+def played(
+    batches: Sequence[CheckedBatch],
+    means: Means,
+    manner: Manner,
+    announce: Announce = lambda batch, jobs: None,
+) -> tuple[list[Ended], bool]:
+    """Play batches that were checked; what they came to, and whether that was cut short."""
+    ended: list[Ended] = []
+    with opened(means) as (executor, jobs), Interrupts(manner.quiet) as interrupts:
+        batches = [_tried_out(executor, batch) for batch in batches]
+        for batch in batches:
+            if interrupts() and ended:
+                break
+            ended.append(_play(batch, executor, jobs, interrupts, manner, announce))
+    cut_short = len(ended) < len(batches) or any(one.cut_short for one in ended)
+    return ended, interrupts() and cut_short
+
+
+def _tried_out(executor: Executor, batch: CheckedBatch) -> CheckedBatch:
+    """Have the batch loaded once, where it will be played; what the ego wrote is no input."""
+    _try_out(executor, batch.prepared)
+    known = batch.prepared.checksums
+    written = OutputWatch(batch.prepared.plan.scenario.ego, known).outputs()
+    if known.keys().isdisjoint(written):
+        return batch
+    return batch.without(written)
+
+
+def _try_out(executor: Executor, prepared: PreparedBatch) -> None:
+    """Have the batch loaded once."""
+    try:
+        executor.submit(try_out, prepared).result()
+    except CavsumoError:
+        raise
+    except Exception as error:  # anything that keeps an executor's processes from playing
+        raise InputError(f"the executor cannot play: {type(error).__name__}: {error}") from error
+
+
+def _play(
+    batch: CheckedBatch,
+    executor: Executor,
+    jobs: int,
+    interrupts: Interrupts,
+    manner: Manner,
+    announce: Announce,
+) -> Ended:
+    """Play a batch into its file, or what is left of it."""
+    prepared = batch.prepared
+    with Recorder(batch.output) as recorder:
+        batch_run = BatchRun(prepared, recorder, executor, jobs, interrupts, manner.quiet)
+        if batch.recorded is None:
+            batch_run.begin(batch.manifest, overwrite=manner.overwrite)
+        else:
+            batch_run.resume({**batch.recorded, "plan": batch.manifest["plan"]})
+        if not manner.quiet:
+            announce(batch, jobs)
+        _carry_out(batch_run, manner)
+    return Ended(
+        batch.name,
+        batch.output,
+        batch_run.tally,
+        recorder.traces,
+        sequential=looks_at_rows(prepared.plan),
+        shared=prepared.plan.reset == "shared",
+        cut_short=batch_run.cut_short or batch_run.status == "interrupted",
+        promises={member.label: member.promise for member in prepared.cast},
+    )
+
+
+def _carry_out(batch_run: BatchRun, manner: Manner) -> None:
+    """Do what was asked for, and complete the manifest whatever happens."""
+    try:
+        if manner.retry_errors:
+            batch_run.retry()
+        if manner.resume or not manner.retry_errors:
+            batch_run.play()
+    except KeyboardInterrupt:  # twice: what runs is given up
+        batch_run.status = "interrupted"
+    finally:
+        batch_run.end()

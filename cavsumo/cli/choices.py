@@ -1,0 +1,22 @@
+"""The names that options take, by the sort of things that have them; nothing heavy is imported."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping
+
+from cavsumo.agents.names import AGENT_NAMES
+from cavsumo.assertions.names import ASSERTION_NAMES
+from cavsumo.egos.names import EGO_NAMES
+from cavsumo.egos.reference.names import REFERENCE_NAMES
+from cavsumo.model import named_networks
+from cavsumo.model.bodies import KINDS
+from cavsumo.model.scenario import NO_REFERENCE
+
+CHOICES: Mapping[str, Callable[[], Iterable[str]]] = {
+    "agent": lambda: AGENT_NAMES,
+    "assertion": lambda: ASSERTION_NAMES,
+    "ego": lambda: EGO_NAMES,
+    "kind of body": lambda: KINDS,
+    "network": named_networks.names,
+    "reference driver": lambda: (NO_REFERENCE, *REFERENCE_NAMES),
+}

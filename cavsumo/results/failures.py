@@ -1,0 +1,38 @@
+"""Failures in the order in which they matter: what a careful driver would have prevented first.
+
+A failure is an episode in which the ego violated an assertion. It is *preventable* if the reference
+driver would have avoided it, *unpreventable* if not (UN R157), *not judged* if that was not asked
+or could not be told.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from typing import Any, TypeVar
+
+from cavsumo.results.rows import cell, is_failure
+
+PREVENTABLE, NOT_JUDGED, UNPREVENTABLE = "preventable", "not judged", "unpreventable"
+ORDER = (PREVENTABLE, NOT_JUDGED, UNPREVENTABLE)
+
+AnyRow = TypeVar("AnyRow", bound=Mapping[str, Any])
+
+
+def failure_kind(row: Mapping[str, Any]) -> str:
+    """Which kind of failure an episode is, empty for none.
+
+    Args:
+        row: as it was made, as text, or from a table whose numbers are floats (NaN for none).
+    """
+    if not is_failure(row):
+        return ""
+    said = cell(row.get("avoidable"))
+    if not said:
+        return NOT_JUDGED
+    return PREVENTABLE if float(said) == 1.0 else UNPREVENTABLE
+
+
+def preventable_first(rows: Iterable[AnyRow]) -> list[AnyRow]:
+    """The failures among some rows, by kind; each kind in the order of the rows."""
+    failures = [row for row in rows if is_failure(row)]
+    return sorted(failures, key=lambda row: ORDER.index(failure_kind(row)))

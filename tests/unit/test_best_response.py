@@ -1,0 +1,321 @@
+"""Best response: from counts of the ego to a decision process to a tester, and that in SUMO."""
+
+from __future__ import annotations
+
+import csv
+import dataclasses
+import json
+import math
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from support import STRAIGHT_NET
+
+from cavsumo.agents import AGENTS
+from cavsumo.agents.planning import response, solving
+from cavsumo.agents.planning.opponent import KEEPS, OLDEST, AccelerationReader, Counts, situation
+from cavsumo.agents.planning.response import (
+    SPEEDS,
+    STAND,
+    WALK,
+    ZETAS,
+    Aim,
+    States,
+    braking,
+    corners,
+    grid_for,
+    move,
+    scale,
+)
+from cavsumo.agents.planning.solving import best_response, chain, layer, roll_out, unsolved
+from cavsumo.errors import InputError
+
+DT = 0.1
+
+
+@pytest.fixture
+def small(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A coarse grid, which is solved in a moment."""
+    monkeypatch.setattr(response, "BEFORE_S", 1.0)
+    monkeypatch.setattr(solving, "ROLLOUTS", 10)
+    for module in (response, solving):
+        monkeypatch.setattr(module, "ZETAS", ZETAS[::3])
+        monkeypatch.setattr(module, "SPEEDS", SPEEDS[::2])
+
+
+def watched(accelerations: list[float], v: float = 8.0) -> list[tuple[int, bool | None]]:
+    """Age and whether it was chosen anew, after each timestep of an ego."""
+    watch, seen = AccelerationReader(DT), []
+    watch.see(v)
+    for a in accelerations:
+        v = max(0.0, v + a * DT)
+        watch.see(v)
+        seen.append((watch.held, watch.changed))
+    return seen
+
+
+def driver(period: int, reaction: float) -> Counts:
+    """Of an ego that decides once in a period: it keeps its speed, and brakes when it sees you."""
+    counts = Counts()
+    for entry_s, a in ((math.inf, 0.0), (0.3, reaction), (0.0, reaction)):
+        for gap in (1.0, 2.0, 3.0, 4.0, 6.0, 9.0, 20.0):
+            for v in (2.0, 5.0, 8.0):
+                for held in range(period):
+                    for _ in range(20):
+                        changed = held == period - 1
+                        counts.add(situation(entry_s, gap, v), held, a, changed=changed)
+    return counts
+
+
+# Counting -----------------------------------------------------------------------------------------
+
+
+def test_the_age_of_an_acceleration_is_seen_from_outside() -> None:
+    """The first was chosen as the ego entered; another one begins at age 0."""
+    assert watched([0.5, 0.5, -1.0, -1.0]) == [(0, None), (1, False), (0, True), (1, False)]
+
+
+def test_a_standing_ego_shows_no_decision() -> None:
+    """It may decide what it likes; when it moves off, that is a new one."""
+    assert watched([-9.0, 0.0, 2.0, 2.0], 0.5) == [
+        (OLDEST, None), (OLDEST, None), (0, True), (1, False)
+    ]  # fmt: skip
+
+
+def test_hazards_are_shares_of_what_was_counted() -> None:
+    """Held 60 times at age 3 and changed 20 times, with two pseudo-counts for the pooled share."""
+    counts = Counts()
+    for changed in [False] * 60 + [True] * 20:
+        counts.add(situation(math.inf, 50.0, 8.0), 3, -1.0, changed=changed)
+    assert counts.hazard(0, 3) == pytest.approx((20 + 2 * 21 / 81) / 82)
+    assert counts.hazard(0, 5) == 1.0, "an ego of which nothing is known decides at any time"
+
+
+def test_an_unseen_situation_keeps_its_speed() -> None:
+    """Nothing counted: all on the class around 0; counts of the same entry speak first."""
+    counts = Counts()
+    assert counts.chances(situation(0.3, 5.0, 8.0))[KEEPS] == 1.0
+    for _ in range(6):
+        counts.add(situation(0.3, 5.0, 8.0), 0, -4.5, changed=True)
+    share = 0.0
+    shares = [share := (6 + 2 * share) / 8 for _ in range(4)]
+    alike = (situation(0.5, 50.0, 2.0), situation(0.5, 5.0, 8.0), situation(0.3, 5.0, 7.9))
+    for key, expected in zip(alike, (shares[0], shares[1], shares[3]), strict=True):
+        assert counts.chances(key) == pytest.approx([0, expected, 0, 0, 1 - expected, 0])
+
+
+def test_floors_hold_together() -> None:
+    """Clopper-Pearson at a sixth of the risk: k of n is then as likely as that risk (19 of 20)."""
+    counts, key = Counts(), situation(0.3, 5.0, 8.0)
+    for a in [-4.5] * 19 + [0.0]:
+        counts.add(key, 0, a, changed=True)
+    floors, risk = counts.floor(key, 0.9), 0.1 / 6
+    p, q = floors[1], floors[4]
+    assert p**20 + 20 * p**19 * (1 - p) == pytest.approx(risk)
+    assert 1 - (1 - q) ** 20 == pytest.approx(risk)
+    assert [floors[k] for k in (0, 2, 3, 5)] == [0.0] * 4
+
+
+def test_counts_are_plain_data() -> None:
+    """Through JSON and back they are the same."""
+    counts = driver(5, -4.5)
+    again = Counts.of(json.loads(json.dumps(counts.plain())))
+    assert again.plain() == counts.plain()
+
+
+# From counts to a game ----------------------------------------------------------------------------
+
+
+def one(entry: float, gap: float, v: float, held: int = 0) -> States:
+    """A state."""
+    return States(np.array([entry]), np.array([gap]), np.array([v]), np.array([held]))
+
+
+def test_a_timestep_is_the_kinematics() -> None:
+    """SUMO moves by the new speed; walking brings the entry nearer."""
+    grid = grid_for(driver(10, -4.5), DT)
+    for action, entry in ((STAND, 8.0), (WALK, 7.0)):
+        after = move(
+            one(8, 20.0, 8.0), np.array([action]), np.array([-5.0]), np.array([3]), grid, Aim()
+        )
+        assert after.states.entry == entry
+        assert after.states.v == pytest.approx(7.5)
+        assert after.states.gap == pytest.approx(20.0 - 0.75)
+
+
+def test_an_ego_that_keeps_its_speed_keeps_its_zeta() -> None:
+    """So a walk on the grid is not blurred: one corner has all the weight, and the same zeta."""
+    grid = grid_for(driver(10, -4.5), DT)
+    i, k = 6, 3
+    v, entry = SPEEDS[k], 8
+    gap = braking(v) + ZETAS[i] * scale(v) + v * entry * DT
+    after = move(one(entry, gap, v), np.array([WALK]), np.zeros(1), np.array([1]), grid, Aim())
+    places, weights = corners(after.states, np.array([KEEPS]), grid)
+    found = {tuple(int(x) for x in np.unravel_index(p, grid.shape)): w
+             for p, w in zip(places[:, 0], weights[:, 0], strict=True) if w > 1e-9}  # fmt: skip
+    assert found == {(entry - 1 + grid.inside, i, k, 1, KEEPS): pytest.approx(1.0)}
+
+
+@pytest.mark.parametrize(
+    ("gap", "v", "price"),
+    [
+        (1.0, 8.0, 2.0),  # in the braking zone, which is 3.6 m long: unfair
+        (-9.0, 8.0, 1.0),  # behind the ego: nothing
+        (4.0, 0.05, 1.0),  # before a standing ego: nothing
+    ],
+)
+def test_entering_at_the_wrong_moment_has_its_price(gap: float, v: float, price: float) -> None:
+    """Whoever enters there has missed his test, or spoilt it."""
+    grid = grid_for(driver(10, -4.5), DT)
+    after = move(one(1, gap + v * DT, v), np.array([WALK]), np.zeros(1), np.array([1]), grid, Aim())
+    assert after.over == pytest.approx(1.0)
+    assert after.price == pytest.approx(price)
+
+
+def test_a_hit_in_the_strip_is_free_and_a_stop_is_not() -> None:
+    """A violation costs nothing; an ego that stands was held."""
+    grid = grid_for(driver(10, -4.5), DT)
+    hit = move(one(-3, 0.5, 8.0), np.array([WALK]), np.zeros(1), np.array([1]), grid, Aim())
+    assert (hit.over, hit.price) == (1.0, 0.0)
+    stop = move(one(-3, 0.5, 0.5), np.array([WALK]), np.array([-9.0]), np.array([1]), grid, Aim())
+    assert (stop.over, stop.price) == (1.0, 1.0)
+
+
+def test_a_committed_body_is_hit_by_an_ego_that_does_not_look() -> None:
+    """Never braking, it hits who enters at 5 m/s 2.5 m before it, and that is known for certain."""
+    counts = driver(1, 0.0)
+    plan = unsolved(counts, DT, Aim())
+    chain(plan)
+    worth = plan.back_up(one(2, 2.5 + 1.0, 5.0), np.array([WALK]), np.zeros(1), np.array([KEEPS]))
+    assert worth.worth == pytest.approx(0.0, abs=0.05)
+
+
+def test_the_solution_satisfies_the_bellman_equation(small: None) -> None:
+    """Backed up, the values of states that can still choose stay within precision."""
+    plan = best_response(driver(2, -4.5), DT, Aim())
+    grid = plan.grid
+    assert grid.ages == 2
+    states, which = layer(grid, grid.committed + 1)
+    moves = [
+        plan.back_up(states, np.full(len(which), m), plan.model.middles[which], which).worth
+        for m in (STAND, WALK)
+    ]
+    start = (grid.committed + 1 + grid.inside) * grid.layer
+    value = plan.value[start : start + grid.layer]
+    assert np.abs(np.max(moves, axis=0) - value).max() < 2 * response.PRECISION
+
+
+def test_the_phase_of_the_driver_decides() -> None:
+    """An ego that decides once a second is hit by who enters just after it decided, not before."""
+    plan = unsolved(driver(10, -8.0), DT, Aim())
+    roll_out(plan)
+    gap = 5.0 + 8.0 * 0.9
+    fresh, due = (
+        plan.back_up(one(9, gap, 8.0, held), np.array([WALK]), np.zeros(1), np.array([KEEPS]))
+        for held in (8, 4)
+    )
+    assert fresh.worth > due.worth + 0.5
+
+
+def test_distrust_costs(small: None, monkeypatch: pytest.MonkeyPatch) -> None:
+    """With sets around few counts every state is worth at most what the counts say."""
+    monkeypatch.setattr(solving, "roll_out", chain)
+    counts = driver(2, -4.5)
+    trusting = best_response(counts, DT, Aim())
+    robust = best_response(counts, DT, Aim(confidence=0.9))
+    assert (robust.value <= trusting.value + 2 * response.PRECISION).all()
+    assert (robust.value < trusting.value - 0.1).any()
+
+
+def test_a_test_is_easier_than_a_violation(small: None) -> None:
+    """What ends in a fair collision was a fair test before."""
+    counts = driver(2, -4.5)
+    violation = best_response(counts, DT, Aim())
+    test = best_response(counts, DT, dataclasses.replace(Aim(), violation=False))
+    assert (test.value >= violation.value - 0.1).all()
+
+
+# The tester ---------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("params", "said"),
+    [
+        ({"learn": False}, "model=FILE"),
+        ({"model": "nowhere.json"}, "nowhere.json"),
+        ({"aim": "crash"}, "aim"),
+        ({"confidence": 1.5}, "confidence"),
+        ({"unfair": -1.0}, "unfair"),
+    ],
+)
+def test_what_cannot_be_played_is_refused(params: dict[str, Any], said: str) -> None:
+    """In one sentence that names the parameter."""
+    with pytest.raises(InputError, match=f"agent best-response: .*{said}"):
+        AGENTS.make("best-response", params)
+
+
+@pytest.mark.parametrize(
+    ("key", "value"),
+    [("ages", []), ("sums", [[0.0, 1]]), ("taken", {"1,2,3": [1]}), ("taken", {"a": [0] * 6}),
+     ("taken", {"1,2,3": [-1] * 6}), ("sums", [[math.nan, 0]] * 6), ("taken", [1])],
+)  # fmt: skip
+def test_damaged_counts_are_refused(tmp_path: Path, key: str, value: Any) -> None:
+    """Before anything is played, in one sentence."""
+    file = tmp_path / "model.json"
+    file.write_text(json.dumps({"counts": {**driver(1, -4.5).plain(), key: value}}))
+    with pytest.raises(InputError, match="agent best-response: model"):
+        AGENTS.make("best-response", {"model": str(file)})
+
+
+@pytest.mark.parametrize("text", ["", "[]", '{"counts": {}}', '{"learned": {"timing": null}}'])
+def test_a_file_without_counts_is_refused(tmp_path: Path, text: str) -> None:
+    """It says what was expected."""
+    file = tmp_path / "model.json"
+    file.write_text(text)
+    with pytest.raises(InputError, match="expected the manifest of a batch"):
+        AGENTS.make("best-response", {"model": str(file)})
+
+
+def cavsumo(*words: object) -> subprocess.CompletedProcess[str]:
+    """A command, in a process of its own."""
+    return subprocess.run(
+        [sys.executable, "-m", "cavsumo", *map(str, words)],
+        capture_output=True, text=True, timeout=300, check=False,
+    )  # fmt: skip
+
+
+def test_it_learns_and_what_it_learned_is_played_frozen(tmp_path: Path) -> None:
+    """Two episodes teach it how SUMO's driver decides; the manifest is the model of other batches.
+
+    The ego decides in every timestep here, so that there is but one age and the plan is small.
+    """
+    base = ("--net", STRAIGHT_NET, "--agent", "best-response", "--testers", 2)
+    base += (
+        "--ego-param",
+        "actionStepLength=0",
+        "--trace",
+        "none",
+        "-q",
+        "--exit-zero",
+        "--step-length",
+        0.2,
+    )
+    first, second = tmp_path / "first.csv", tmp_path / "second.csv"
+    taught = cavsumo("run", *base, "--runs", 2, "--seed", 101, "-o", first)
+    assert taught.returncode == 0, taught.stderr
+    model = json.loads(first.with_suffix(".json").read_text())["learned"]["best-response"][0]
+    assert model["episodes"] == 2
+    counts = Counts.of(model["counts"])
+    assert sum(map(sum, counts.taken.values())) > 50
+    frozen = ("--param", "learn=false", "--param", f"model={first.with_suffix('.json')}")
+    played = cavsumo("run", *base, *frozen, "--runs", 2, "-j", 2, "-o", second)
+    assert played.returncode == 0, played.stderr
+    with second.open(encoding="utf-8") as rows:
+        assert all(row["outcome"] != "error" for row in csv.DictReader(rows))
+    manifest = json.loads(second.with_suffix(".json").read_text())
+    assert str(first.with_suffix(".json")) in manifest["sha256"]
+    assert "best-response" not in manifest.get("learned", {})

@@ -1,0 +1,191 @@
+"""The layout: which room may use which, who touches SUMO, and what an import costs."""
+
+from __future__ import annotations
+
+import ast
+import subprocess
+import sys
+from collections import defaultdict
+from collections.abc import Iterable, Iterator, Mapping
+from pathlib import Path
+
+import cavsumo
+
+PACKAGE = Path(cavsumo.__file__).parent
+
+# In order: each room with the rooms before it that it uses, lazily or not. Errors and the version
+# stand at the root, for all of them.
+ROOMS = {
+    room: frozenset(uses.split())
+    for room, uses in {
+        "model": "",
+        "games": "model",
+        "network": "model",
+        "agents": "model games",
+        "assertions": "model network agents",
+        "egos": "model agents assertions",
+        "sumo": "model network egos",
+        "simulation": "model network agents assertions egos sumo",
+        "results": "model network agents assertions egos sumo simulation",
+        "batch": "model network agents assertions egos sumo simulation results",
+        "report": "model network assertions egos results batch",
+        "interop": "model network sumo results",
+        "api": "model network batch report results",
+        "envs": "model network agents assertions egos simulation results batch",
+        "testing": "model network agents assertions egos",
+        "cli": "model games network agents assertions egos results batch report interop testing",
+    }.items()
+}
+ROOT = {"__init__", "__main__", "errors"}
+
+HEAVY = {"numpy", "pandas", "scipy", "shapely", "libsumo", "sumolib", "pydantic", "rich"}
+HEAVY |= {"matplotlib", "osmium", "pyproj", "sumo", "jinja2", "traci"}
+
+
+def sources() -> dict[str, Path]:
+    """Every module of the package with its file, by its name without ``cavsumo.``."""
+    found = {}
+    for file in sorted(PACKAGE.rglob("*.py")):
+        parts = file.relative_to(PACKAGE).with_suffix("").parts
+        found[".".join(parts[:-1] if parts[-1] == "__init__" and parts[1:] else parts)] = file
+    return found
+
+
+SOURCES = sources()
+TREES = {name: ast.parse(file.read_text(encoding="utf-8")) for name, file in SOURCES.items()}
+
+
+def imported(module: str) -> Iterator[str]:
+    """The full names of all modules that a module imports, inside functions too."""
+    for node in ast.walk(TREES[module]):
+        if isinstance(node, ast.Import):
+            yield from (alias.name for alias in node.names)
+        elif isinstance(node, ast.ImportFrom):
+            assert node.level == 0, f"{module}: relative import"
+            for alias in node.names:
+                whole = f"{node.module}.{alias.name}"
+                yield whole if whole.removeprefix("cavsumo.") in SOURCES else str(node.module)
+
+
+def used(module: str) -> set[str]:
+    """The modules of the package that a module imports."""
+    names = {name for name in imported(module) if name.startswith("cavsumo.")}
+    return {name.removeprefix("cavsumo.") for name in names}
+
+
+def room(module: str) -> str:
+    """The room in which a module stands; empty for the root."""
+    first = module.split(".")[0]
+    return "" if first in ROOT else first
+
+
+def cycles(graph: Mapping[str, Iterable[str]]) -> list[list[str]]:
+    """The strongly connected components of more than one node (Tarjan 1972)."""
+    number: dict[str, int] = {}
+    lowest: dict[str, int] = {}
+    stack: list[str] = []
+    found: list[list[str]] = []
+
+    def visit(node: str) -> None:
+        number[node] = lowest[node] = len(number)
+        stack.append(node)
+        for other in graph.get(node, ()):
+            if other not in number:
+                visit(other)
+                lowest[node] = min(lowest[node], lowest[other])
+            elif other in stack:
+                lowest[node] = min(lowest[node], number[other])
+        if lowest[node] == number[node]:
+            place = stack.index(node)
+            found.append(sorted(stack[place:]))
+            del stack[place:]
+
+    for node in graph:
+        if node not in number:
+            visit(node)
+    return [component for component in found if len(component) > 1]
+
+
+def loaded_by(module: str) -> set[str]:
+    """The packages that a fresh Python has loaded after importing modules."""
+    code = f"import sys, {module}; print(*{{name.split('.')[0] for name in sys.modules}})"
+    done = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, check=True, timeout=120
+    )
+    return set(done.stdout.split())
+
+
+def test_the_root_holds_three_files() -> None:
+    """Everything else stands in a room."""
+    assert {file.stem for file in PACKAGE.glob("*.py")} == ROOT
+    rooms = {folder.parent.name for folder in PACKAGE.glob("*/__init__.py")}
+    assert rooms == set(ROOMS)
+
+
+def test_a_room_uses_only_the_rooms_that_it_names() -> None:
+    """Imports point one way, so each room can be read, tested and replaced by itself."""
+    found: dict[str, set[str]] = {name: set() for name in ROOMS}
+    for module in SOURCES:
+        if here := room(module):
+            found[here] |= {room(name) for name in used(module)} - {here, ""}
+    assert found == ROOMS
+
+
+def test_a_room_names_only_rooms_before_it() -> None:
+    """The order of the list is the order of the house."""
+    for place, (name, uses) in enumerate(ROOMS.items()):
+        assert uses <= set(list(ROOMS)[:place]), name
+
+
+def test_no_files_import_each_other() -> None:
+    """No cycle, within rooms and across them, lazy imports included."""
+    assert cycles({module: used(module) for module in SOURCES}) == []
+
+
+def test_cycles_are_found() -> None:
+    """The search itself: one cycle of three, one of two, and a node before them."""
+    graph = {"a": "b", "b": "cd", "c": "e", "e": "b", "d": "f", "f": "d"}
+    assert sorted(cycles(graph)) == [["b", "c", "e"], ["d", "f"]]
+    assert cycles({"a": "bc", "b": "c", "c": ""}) == []
+
+
+def test_only_the_boundary_imports_sumo() -> None:
+    """One room simulates, even lazily; traci only shows."""
+    users: dict[str, set[str]] = defaultdict(set)
+    for module in SOURCES:
+        for name in {name.split(".")[0] for name in imported(module)} & {"libsumo", "traci"}:
+            users[name].add(room(module))
+    assert users == {"libsumo": {"sumo"}, "traci": {"interop"}}
+
+
+def test_a_class_name_has_one_meaning() -> None:
+    """No two classes of the package have the same name."""
+    places: dict[str, list[str]] = defaultdict(list)
+    for module, tree in TREES.items():
+        for node in ast.walk(tree):
+            if isinstance(node, ast.ClassDef):
+                places[node.name].append(module)
+    assert {name: at for name, at in places.items() if len(at) > 1} == {}
+
+
+def test_every_room_says_what_lives_there() -> None:
+    """Ten lines at most: what lives there, what does not, where to add one more."""
+    for name in ROOMS:
+        text = ast.get_docstring(TREES[name])
+        assert text, name
+        assert len(text.splitlines()) <= 10, name
+
+
+def test_the_command_line_starts_light() -> None:
+    """Help and mistakes are answered at once: nothing heavy is loaded before a command runs."""
+    assert not HEAVY & loaded_by("cavsumo.cli")
+
+
+def test_the_process_that_waits_has_no_sumo() -> None:
+    """SUMO may take its process down, so the parent, which keeps the results, never loads it."""
+    assert "libsumo" not in loaded_by("cavsumo.batch.playing, cavsumo.cli.commands.run")
+
+
+def test_an_ego_is_checked_without_pytest() -> None:
+    """Who installs cavsumo alone has the command too."""
+    assert "pytest" not in loaded_by("cavsumo.cli.commands.check_ego")
