@@ -108,7 +108,8 @@ def _called(case: Case) -> int:
         return _replied(case.files["line"])
     start = _simulated if case.simulated else _accepted
     with (
-        mock.patch.object(Worker, "_launch", start),
+        mock.patch.object(Worker, "start", start),
+        mock.patch.object(Worker, "play", _accepted),
         contextlib.redirect_stdout(io.StringIO()),
     ):
         return int(cavsumo(list(case.words)))
@@ -119,7 +120,7 @@ def _accepted(*_: object) -> None:
     raise Accepted
 
 
-def _simulated(worker: Worker, strict: bool) -> None:
+def _simulated(worker: Worker) -> None:
     """Load the batch in SUMO and play an episode, in a fork, which may crash."""
     ours, theirs = Pipe()
     pid = os.fork()
@@ -127,7 +128,7 @@ def _simulated(worker: Worker, strict: bool) -> None:
         try:
             os.dup2(os.open(os.devnull, os.O_WRONLY), 2)
             with EpisodeRunner(worker.prepared) as runner:
-                runner.try_out(strict=strict)
+                runner.try_out()
                 runner.play(job(worker.prepared.plan, 0))
             theirs.send(None)
         except (CavsumoError, OSError) as error:

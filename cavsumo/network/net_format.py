@@ -16,7 +16,7 @@ LEFT_OUT = ("connector",)  # of those that sumolib does not read
 FUNCTIONS = ("", *INSIDE, *LEFT_OUT)
 
 
-class AttributeKind(NamedTuple):
+class Sort(NamedTuple):
     """A kind of attribute: whether a text is one, and what is expected, in words."""
 
     fits: Callable[[str], bool]
@@ -37,35 +37,31 @@ def _is_line(text: str) -> bool:
     return len(text.split()) > 1 and _is_shape(text)
 
 
-def _numbers(count: int) -> AttributeKind:
+def _numbers(count: int) -> Sort:
     def fits(text: str) -> bool:
         parts = text.split(",")
         return len(parts) == count and all(map(_is_number, parts))
 
-    return AttributeKind(fits, f"{count} numbers with commas between")
+    return Sort(fits, f"{count} numbers with commas between")
 
 
-NAME = AttributeKind(lambda text: bool(text.strip()), "a name")
-TEXT = AttributeKind(lambda text: True, "a text")
-NUMBER = AttributeKind(_is_number, "a number")
-SIZE = AttributeKind(lambda text: _is_number(text) and float(text) >= 0.0, "a number of at least 0")
-WHOLE = AttributeKind(lambda text: _WHOLE.fullmatch(text.strip()) is not None, "a whole number")
-INDEX = AttributeKind(
-    lambda text: WHOLE.fits(text) and int(text) >= 0, "a whole number of at least 0"
-)
-SHAPE = AttributeKind(_is_shape, "points x,y with blanks between")
-LINE = AttributeKind(_is_line, "two points x,y or more, with blanks between")
-FUNCTION = AttributeKind(
-    lambda text: text in FUNCTIONS, "one of " + ", ".join(filter(None, FUNCTIONS))
-)
-BITS = AttributeKind(lambda text: re.fullmatch("[01]+", text) is not None, "zeros and ones")
-STEPS = AttributeKind(lambda text: all(map(WHOLE.fits, text.split())), "whole numbers")
-VERSION = AttributeKind(
+NAME = Sort(lambda text: bool(text.strip()), "a name")
+TEXT = Sort(lambda text: True, "a text")
+NUMBER = Sort(_is_number, "a number")
+SIZE = Sort(lambda text: _is_number(text) and float(text) >= 0.0, "a number of at least 0")
+WHOLE = Sort(lambda text: _WHOLE.fullmatch(text.strip()) is not None, "a whole number")
+INDEX = Sort(lambda text: WHOLE.fits(text) and int(text) >= 0, "a whole number of at least 0")
+SHAPE = Sort(_is_shape, "points x,y with blanks between")
+LINE = Sort(_is_line, "two points x,y or more, with blanks between")
+FUNCTION = Sort(lambda text: text in FUNCTIONS, "one of " + ", ".join(filter(None, FUNCTIONS)))
+BITS = Sort(lambda text: re.fullmatch("[01]+", text) is not None, "zeros and ones")
+STEPS = Sort(lambda text: all(map(WHOLE.fits, text.split())), "whole numbers")
+VERSION = Sort(
     lambda text: re.fullmatch(r"\d{1,4}(\.\d{1,4})+", text, re.ASCII) is not None,
     "a version such as 1.20",
 )
 
-Attributes = Mapping[str, AttributeKind]
+Attributes = Mapping[str, Sort]
 # What is used of each element: attributes that it must have, and those that it may.
 ELEMENTS: Mapping[str, tuple[Attributes, Attributes]] = {
     "net": ({"version": VERSION}, {}),

@@ -60,8 +60,11 @@ class Trace:
 
     @property
     def row(self) -> dict[str, str]:
-        """The row of the episode as text, without what no replay reproduces."""
-        return dict(self.head["row"])
+        """The row of the episode as text, without what no replay reproduces.
+
+        A column that its writer did not know is empty.
+        """
+        return {c: "" for c in COLUMNS if c not in NOT_REPLAYED} | self.head["row"]
 
     def shapes(self) -> dict[str, Shape]:
         """The boxes of all bodies by their ids."""
