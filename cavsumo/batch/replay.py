@@ -14,14 +14,14 @@ from cavsumo.batch.messages import Answer
 from cavsumo.batch.prepared import PreparedBatch, prepare
 from cavsumo.batch.trust import check_trust
 from cavsumo.batch.worker import Worker, search
-from cavsumo.errors import DivergenceError, InputError, ResultsError
+from cavsumo.errors import DivergenceError, InputError, ResultsError, shown
 from cavsumo.model.bodies import STEERING, THROTTLE
 from cavsumo.model.checksums import checksum
 from cavsumo.model.named_networks import check_network, network_file, routes_file
 from cavsumo.model.scenario import BatchPlan, Scenario
 from cavsumo.results.columns import COLUMNS, Row
-from cavsumo.results.reading import inside, read_rows
-from cavsumo.results.recorded_plan import recorded_plan
+from cavsumo.results.reading import check_cells, inside, read_rows
+from cavsumo.results.recorded_plan import plan_in, recorded_plan
 from cavsumo.results.rows import cell
 from cavsumo.results.traces import NOT_REPLAYED, Trace, parsed, read_trace
 
@@ -94,6 +94,7 @@ def recorded_row(csv_file: Path, run: int) -> dict[str, str]:
     rows = {row.get("run"): row for row in read_rows(csv_file)}
     if str(run) not in rows:
         raise ResultsError(f"results {str(csv_file)!r}: no run {run} among {len(rows)} rows")
+    check_cells(csv_file, rows[str(run)])
     return rows[str(run)]
 
 
@@ -106,15 +107,10 @@ def recorded_alone(
     """
     trace, name = read_trace(file), f"trace {str(file)!r}"
     head = trace.head
-    try:
-        plan = BatchPlan.model_validate(head["plan"])
-        row = trace.row
-        int(row["run"]), int(row["seed"]), trace.shapes(), dict(head["sha256"])
-        plan.agents.index(row["agent"])
-        kept, shared = head["memory_kept"], row["reset"] == "shared"
-    except (KeyError, ValueError, TypeError) as error:
-        raise ResultsError(f"{name}: its head holds no valid plan, row and bodies") from error
-    if shared:
+    plan, row, kept = plan_in(head, name), trace.row, head["memory_kept"]
+    if row["agent"] not in plan.cast:
+        raise ResultsError(f"{name}: its plan has no agent {shown(row['agent'])}")
+    if row["reset"] == "shared":
         raise ResultsError(
             f"{name}: was played in a simulation that other episodes used before; replay it from "
             "its results"
