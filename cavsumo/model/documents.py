@@ -1,8 +1,7 @@
 """Text, JSON and TOML from anywhere, read within bounds: what is wrong is said in plain words.
 
-Everybody who reads such a file reads it here, so that nesting, numbers and encodings that would
-only come out as an error of Python somewhere behind are refused at the door. What a reader says of
-the values themselves is its own affair.
+All such files are read here, so that nesting, numbers and encodings that would cause an error of
+Python later are refused where they are read. Each reader checks the values itself.
 """
 
 from __future__ import annotations
@@ -45,7 +44,7 @@ def read_text(
 
 
 def json_of(text: str, parse_float: Callable[[str], Any] = float, *, bounded: bool = True) -> Any:
-    """What a JSON text holds; ValueError in plain words for what is none, or beyond the bounds.
+    """The content of a JSON text; ValueError in plain words for other text, or beyond the bounds.
 
     Numbers that JSON does not have (NaN, Infinity) are refused. Not ``bounded``, the depth is that
     which Python can parse: enough where a shape is asked of what is found.
@@ -65,7 +64,7 @@ def json_of(text: str, parse_float: Callable[[str], Any] = float, *, bounded: bo
 
 
 def toml_of(text: str) -> dict[str, Any]:
-    """What a TOML text holds; ValueError in plain words for what is none, or beyond the bounds."""
+    """The content of a TOML text; ValueError in plain words for other text, or beyond the bounds."""
     try:
         found = tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:
@@ -116,7 +115,7 @@ def _too_deep() -> ValueError:
 
 
 def _check_bounds(document: Any) -> None:
-    """Refuse nesting and numbers that whoever works on the document could not take."""
+    """Refuse nesting and numbers that later steps cannot process."""
     level = [document]
     for _ in range(DEPTH):
         if any(isinstance(value, int) and abs(value) >= 10**DIGITS for value in level):

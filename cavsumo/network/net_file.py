@@ -1,8 +1,8 @@
 """A network file as a stream: every element is checked before sumolib's reader gets it.
 
-sumolib takes what stands in a file for granted; what it cannot take comes out as an error of
-Python, there or wherever the network is used. So whatever is used of a network (attributes,
-numbers, shapes, references from element to element) is checked here, where the line is known.
+sumolib does not check a file; damage becomes an error of Python there or where the network is used.
+So all used parts of a network (attributes, numbers, shapes, references from element to element) are
+checked here, where the line is known.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ class Read(NamedTuple):
 def read_net(file: Path, *, foes: bool) -> Read:
     """Read a network file, packed or not; raises NetworkError in one sentence.
 
-    ``foes``: with the tables of who gives way to whom.
+    ``foes``: with the tables of right of way.
     """
     name = f"network {str(file)!r}"
     reader = _Reader(name, foes)

@@ -1,4 +1,4 @@
-"""What is used of a SUMO network file: elements, their attributes, and what these must be."""
+"""The used parts of a SUMO network file: elements, their attributes, and the values of these."""
 
 from __future__ import annotations
 

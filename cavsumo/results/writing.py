@@ -219,7 +219,7 @@ class Recorder:
         self._write_manifest(RUNNING)
 
     def _note(self, data: bytes) -> None:
-        """What stands in the file now has these bytes more, and we wrote them."""
+        """Note bytes that this process has appended to the file."""
         self._size += len(data)
         self._sum.update(data)
         self._changed = os.fstat(self._file.fileno()).st_mtime_ns
@@ -241,7 +241,7 @@ class Recorder:
             self._changed = there.st_mtime_ns
 
     def _interfered(self, what: str) -> BatchError:
-        """What to say when somebody else was at the results."""
+        """The error for results that another process has changed."""
         return BatchError(
             f"results {str(self.csv_file)!r}: the file {what} while the batch was written; nothing "
             "more is written"

@@ -173,9 +173,9 @@ def test_a_frame_with_a_pose_that_is_none_is_refused(pose: list[object]) -> None
         "testers": {},
         "background": {},
     }
-    check_frame(frame)
+    check_frame(frame, acted=False)
     with pytest.raises(ValueError, match="ego"):
-        check_frame(frame | {"ego": pose})
+        check_frame(frame | {"ego": pose}, acted=False)
 
 
 def test_messages_are_bounded() -> None:
