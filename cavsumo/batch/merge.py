@@ -7,14 +7,14 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
+from cavsumo.batch.ended import Ended
 from cavsumo.batch.preflight import check_kept
 from cavsumo.batch.prepared import OUTPUTS
-from cavsumo.batch.replay import recorded_plan
-from cavsumo.batch.summary import Ended
 from cavsumo.batch.tally import Tally
 from cavsumo.errors import ResultsError
 from cavsumo.results.provenance import differences
 from cavsumo.results.reading import ego_log_name, inside, whole_lines
+from cavsumo.results.recorded_plan import recorded_plan
 from cavsumo.results.rows import Outcome
 from cavsumo.results.writing import Recorder
 
@@ -37,9 +37,9 @@ def merged(parts: Sequence[Path], output: Path, *, overwrite: bool) -> Ended:
         for run, part, row in _in_order(parts):
             files = _trace_of(parts[part], row), _log_of(parts[part], run)
             tally.add(recorder.write(Outcome(row | {"run": run}, *files)))
-        facts = {"episodes": tally.rows, "counts": tally.all.outcomes}
+        facts = tally.facts()
         recorder.finish("finished", facts)
-    return Ended("", output, tally, recorder.traces)
+    return Ended("", output, tally, recorder.traces, str(whole["plan"].get("reference", "none")))
 
 
 def _whole_manifest(parts: Sequence[Path]) -> dict[str, Any]:

@@ -17,7 +17,7 @@ import numpy as np
 
 from cavsumo.agents.casting import Cast, resolve_cast
 from cavsumo.agents.manoeuvres import types_for
-from cavsumo.assertions import make_assertions
+from cavsumo.assertions.specs import assertions_of
 from cavsumo.batch.plan_names import check_names
 from cavsumo.egos import make_ego
 from cavsumo.egos.base import Ego
@@ -113,9 +113,7 @@ def prepare(plan: BatchPlan, ego: Ego | None = None) -> PreparedBatch:
     cast = resolve_cast(plan)
     for member in cast:
         member.make().prepare()
-    make_assertions(
-        scenario.assertions, scenario.assertion_params, scenario.formulas, scenario.step_length
-    )
+    assertions_of(scenario)
     kind = kind_named(scenario.kind)
     _check_kind(scenario, kind, cast)
     if cast.learners and (plan.shard or plan.reset == "shared"):

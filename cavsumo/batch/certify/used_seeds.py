@@ -13,11 +13,11 @@ from typing import Any
 
 import numpy as np
 
-from cavsumo.batch.replay import recorded_plan
 from cavsumo.errors import InputError, ResultsError
 from cavsumo.model.scenario import BatchPlan
 from cavsumo.model.seeds import episode_seed
 from cavsumo.results.reading import FORMAT, rows_of
+from cavsumo.results.recorded_plan import recorded_plan
 
 SUMO_SEEDS = 2**31
 ATTEMPTS = 100  # batches that are tried; each fails only if two seeds agree by chance
