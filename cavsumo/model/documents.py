@@ -64,7 +64,7 @@ def json_of(text: str, parse_float: Callable[[str], Any] = float, *, bounded: bo
 
 
 def toml_of(text: str) -> dict[str, Any]:
-    """The content of a TOML text; ValueError in plain words for other text, or beyond the bounds."""
+    """The content of a TOML text; ValueError in plain words for any other, or beyond bounds."""
     try:
         found = tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:
