@@ -3,17 +3,19 @@
 from __future__ import annotations
 
 import heapq
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
+from cavsumo.batch.located import present_paths
 from cavsumo.batch.preflight import check_kept
 from cavsumo.batch.prepared import OUTPUTS
-from cavsumo.batch.replay import recorded_plan
+from cavsumo.batch.replay import Record, recorded_plan
 from cavsumo.batch.summary import Ended
 from cavsumo.batch.tally import Tally
-from cavsumo.errors import ResultsError
-from cavsumo.results.provenance import differences
+from cavsumo.errors import InputError, ResultsError
+from cavsumo.model.scenario import BatchPlan
+from cavsumo.results.provenance import differences, input_files
 from cavsumo.results.reading import ego_log_name, inside, whole_lines
 from cavsumo.results.rows import Outcome
 from cavsumo.results.writing import Recorder
@@ -23,17 +25,28 @@ APART = frozenset({"shard", "deadline_s", "budget_s"})  # settings in which part
 Numbered = tuple[int, int, dict[str, str]]  # run, which part, row
 
 
-def merged(parts: Sequence[Path], output: Path, *, overwrite: bool) -> Ended:
-    """Check that the parts are complete, then write the whole; raises ResultsError if not."""
+def merged(
+    parts: Sequence[Path],
+    output: Path,
+    *,
+    overwrite: bool,
+    warn: Callable[[str], None] = lambda said: None,
+) -> Ended:
+    """Check that the parts are complete, then write the whole; raises ResultsError if not.
+
+    ``warn`` is told of inputs that are not found, so that the whole is without them.
+    """
     if output.resolve() in [part.resolve() for part in parts]:
         raise ResultsError(f"output {str(output)!r}: is one of the parts")
     whole = _whole_manifest(parts)
     _check_whole(parts, whole)
     if not overwrite:
         check_kept(output, whole)
+    inputs = _inputs(parts, warn)
     tally = Tally()
     with Recorder(output) as recorder:
         recorder.begin(whole, overwrite=overwrite)
+        recorder.keep(inputs)
         for run, part, row in _in_order(parts):
             files = _trace_of(parts[part], row), _log_of(parts[part], run)
             tally.add(recorder.write(Outcome(row | {"run": run}, *files)))
@@ -64,6 +77,30 @@ def _whole_manifest(parts: Sequence[Path]) -> dict[str, Any]:
         "plan": plan,
         "merged_from": [str(part) for part in parts],
     }
+
+
+def _inputs(parts: Sequence[Path], warn: Callable[[str], None]) -> dict[str, Path]:
+    """The inputs of the batch by their checksums, each from the first part that has it."""
+    records = [Record(*_planned(part), file=part) for part in parts]
+    names, sums = input_files(records[0].plan), records[0].origin.get("sha256") or {}
+    found: dict[str, Path] = {}
+    for name, was in names.items():
+        for record in records if name in sums else ():
+            try:
+                found[sums[name]] = present_paths(record, [name]).get(name, was)
+                break
+            except InputError as error:
+                problem = error
+        else:
+            if name in sums:
+                warn(f"{problem}; the whole is without it")
+    return found
+
+
+def _planned(part: Path) -> tuple[BatchPlan, dict[str, str], None, dict[str, Any]]:
+    """The plan and the manifest of a part, as a record of no episode."""
+    plan, manifest = recorded_plan(part)
+    return plan, {}, None, manifest
 
 
 def _check_whole(parts: Sequence[Path], whole: dict[str, Any]) -> None:

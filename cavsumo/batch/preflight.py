@@ -8,11 +8,15 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from cavsumo.agents.policy import policy_file
+from cavsumo.batch.located import present_paths
 from cavsumo.batch.prepared import OUTPUTS, PreparedBatch, manifest, prepare
+from cavsumo.batch.replay import Record
 from cavsumo.errors import InputError, ResultsError
-from cavsumo.model.scenario import plan_from
+from cavsumo.model.labels import cast_of
+from cavsumo.model.scenario import BatchPlan, plan_from
 from cavsumo.model.study import Part
-from cavsumo.results.provenance import differences
+from cavsumo.results.provenance import differences, input_files
 from cavsumo.results.reading import check_replaceable, read_manifest
 from cavsumo.results.writing import check_free
 
@@ -70,9 +74,17 @@ class CheckedBatch:
         )
 
 
-def checked(parts: Sequence[Part], output: Path, manner: Manner) -> list[CheckedBatch]:
-    """Check all batches of a run before any is played; raises InputError in one sentence."""
-    batches = [_checked(part, part.output(output), manner) for part in parts]
+def checked(
+    parts: Sequence[Part],
+    output: Path,
+    manner: Manner,
+    places: Mapping[str, Path] | None = None,
+) -> list[CheckedBatch]:
+    """Check all batches of a run before any is played; raises InputError in one sentence.
+
+    ``places``: the present paths of files, by the names that the parts' settings have for them.
+    """
+    batches = [_checked(part, part.output(output), manner, places or {}) for part in parts]
     return [_in_place(batch, manner) for batch in batches]
 
 
@@ -120,13 +132,14 @@ def episodes_of(manifest: Mapping[str, Any]) -> int:
     return count if isinstance(count, int) else 0
 
 
-def _checked(part: Part, output: Path, manner: Manner) -> CheckedBatch:
+def _checked(part: Part, output: Path, manner: Manner, places: Mapping[str, Path]) -> CheckedBatch:
     """Check one batch."""
     _check_output(output)
     recorded = _recorded(output, manner)
     source = f"run: {part.name}" if part.name else "run"
     settings = {**part.defaults, **recorded_settings(recorded), **part.settings}
-    prepared = prepare(plan_from(settings, source))
+    places = {**places, **_present(recorded, output, part.settings)}
+    prepared = prepare(plan_from(settings, source, places))
     prepared = prepared.without(recorded_outputs(recorded))
     now = manifest(prepared)
     different = [] if recorded is None else list(differences(recorded, now))
@@ -156,6 +169,25 @@ def _recorded(output: Path, manner: Manner) -> dict[str, Any] | None:
     if manner.resume and not rows and not output.with_suffix(".json").exists():
         return None  # a kill may leave an empty file
     return read_manifest(output)
+
+
+def _present(
+    recorded: Mapping[str, Any] | None, output: Path, given: Mapping[str, Any]
+) -> dict[str, Path]:
+    """The present paths of the files of a batch to continue, but for those that are named again."""
+    try:
+        plan = BatchPlan.model_validate((recorded or {})["plan"])
+        agents = cast_of(given.get("agents", ())).values()
+    except (KeyError, ValueError):  # no batch, none to go on with, or agents that are refused later
+        return {}
+    scenario = plan.scenario
+    named = {str(scenario.net)} if "net" in given else set()
+    named |= {str(scenario.routes)} if "routes" in given else set()
+    named |= set(map(str, scenario.additional)) if "additional" in given else set()
+    named |= {str(given.get("params", {}).get(key)) for key in plan.params}
+    named |= {str(policy_file(name)) for name in agents}
+    record = Record(plan, {}, None, recorded or {}, output)
+    return present_paths(record, input_files(plan).keys() - named)
 
 
 def recorded_outputs(recorded: Mapping[str, Any] | None) -> list[str]:

@@ -20,6 +20,8 @@ from typing import Any
 
 from cavsumo.errors import BatchError, ResultsError
 from cavsumo.results.columns import COLUMNS, Row
+from cavsumo.results.inputs import FOLDER as INPUTS
+from cavsumo.results.inputs import keep, remove_others
 from cavsumo.results.reading import (
     FORMAT,
     HEADER,
@@ -82,6 +84,15 @@ class Recorder:
             raise ResultsError(
                 f"results {str(self.csv_file)!r}: cannot be written: {error.strerror}"
             ) from error
+
+    def keep(self, files: Mapping[str, Path]) -> list[Path]:
+        """Keep the inputs of the batch, by their checksums; returns those that are too large."""
+        folder = self.trace_folder / INPUTS
+        try:
+            remove_others(folder, set(files))
+            return [file for sha, file in files.items() if not keep(folder, file, sha)]
+        except OSError as error:
+            raise self._no_more(error) from error
 
     def resume(self, manifest: Mapping[str, Any], todo: Iterator[int]) -> Iterator[dict[str, str]]:
         """Continue after the existing rows, and yield them; call until exhausted.

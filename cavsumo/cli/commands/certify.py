@@ -26,6 +26,7 @@ from cavsumo.batch.certify.ego_list import Egos, choices, opponents
 from cavsumo.batch.certify.tested_policy import Subject, of_policy, of_run, settings_of
 from cavsumo.batch.certify.used_seeds import Used, fresh_seed, used
 from cavsumo.batch.executors import Means
+from cavsumo.batch.located import located, present_paths
 from cavsumo.batch.playing import played
 from cavsumo.batch.preflight import CheckedBatch, Manner, checked
 from cavsumo.batch.prepared import PreparedBatch
@@ -40,6 +41,7 @@ from cavsumo.model.scenario import BatchPlan, Params
 from cavsumo.model.seeds import starts_generator
 from cavsumo.model.study import Part, product
 from cavsumo.network.recorded_starts import recorded_start
+from cavsumo.results.provenance import input_files
 
 FORMAT = 1  # of the JSON; raised when a key changes its meaning or goes
 WIDTH = 120
@@ -95,6 +97,8 @@ def certify(order: CertifyOptions) -> int:
     egos = opponents(order.egos, order.ego_param, plan.scenario)
     check_trust(plan.scenario, order.results, _allowed(order), ego=not order.egos)
     seeds = used([order.results, *order.apart], order.param)
+    batch = Record(plan, {}, None, manifest, order.results)
+    places = present_paths(batch, input_files(plan))
     subject, record = _subject(order, plan, manifest)
     seed = fresh_seed(order.seed, order.runs, seeds.seeds)
     parts = _parts(order, manifest, subject, egos, seed)
@@ -105,7 +109,7 @@ def certify(order: CertifyOptions) -> int:
         exit_zero=order.exit_zero,
     )
     with _output(order) as output:
-        batches = [_marked(b, order, subject) for b in checked(parts, output, manner)]
+        batches = [_marked(b, order, subject) for b in checked(parts, output, manner, places)]
         _check_batches(order, batches, subject, record)
         _warn(manifest, batches[0].prepared, record, seeds, subject)
         if not order.quiet:
@@ -186,7 +190,7 @@ def _subject(
     """The test, and its run if it has one."""
     if not order.test.isdecimal():
         return of_policy(order.test, plan, manifest, order.results, order.param), None
-    record = recorded(order.results, int(order.test), _allowed(order))
+    record = located(recorded(order.results, int(order.test), _allowed(order)))
     kept = order.starts != "fresh"
     return of_run(record, order.param, kept=kept, open_loop=order.open_loop), record
 

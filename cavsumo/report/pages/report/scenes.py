@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
-from cavsumo.batch.replay import Record, located
+from cavsumo.batch.located import located
+from cavsumo.batch.replay import Record
 from cavsumo.batch.shown import is_ours, shown_site
 from cavsumo.errors import CavsumoError
 from cavsumo.model.scenario import BatchPlan
@@ -51,7 +52,7 @@ def _scene(batch: Batch) -> BatchPlace:
     name = batch.plan.scenario.name
     try:
         record = Record(batch.plan, {}, None, batch.manifest, batch.csv_file)
-        plan = located(record, None, None).plan
+        plan = located(record, shown=True).plan
         return BatchPlace(name, plan, shown_site(plan, _some_trace(batch)), "")
     except CavsumoError as error:
         return BatchPlace(name, None, None, str(error))
