@@ -11,7 +11,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from cavsumo.agents.base import AGENTS, Agent
-from cavsumo.agents.policy import PREFIX, make_agent, parameters_of, policy_file
+from cavsumo.agents.names import PREFIX, policy_file
+from cavsumo.agents.policy import make_agent, parameters_of
 from cavsumo.errors import InputError, UnknownName
 from cavsumo.model.bodies import Body, kind_named, model_of
 from cavsumo.model.objects import is_here, is_object

@@ -1,5 +1,11 @@
-"""The tester agents that come with cavsumo: each name with the file that registers it."""
+"""The tester agents that come with cavsumo: each name with the file that registers it.
 
+And ``policy:FILE``, in place of a name: a tester that a user trained.
+"""
+
+from pathlib import Path
+
+from cavsumo.errors import InputError
 from cavsumo.model.names import Names
 
 AGENT_NAMES = Names(
@@ -18,3 +24,14 @@ AGENT_NAMES = Names(
         "timing": "programmed",
     },
 )
+
+PREFIX = "policy:"
+
+
+def policy_file(spec: str) -> Path | None:
+    """The file of ``policy:FILE``, None for any other name."""
+    if not spec.startswith(PREFIX):
+        return None
+    if spec == PREFIX:
+        raise InputError(f"agent {spec!r}: expected the file of a policy, {PREFIX}FILE")
+    return Path(spec.removeprefix(PREFIX))

@@ -6,13 +6,13 @@ Such a tester is accepted in every place of the name of a registered one.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from cavsumo.agents.base import AGENTS, Agent
 from cavsumo.agents.features import across, towards
+from cavsumo.agents.names import policy_file
 from cavsumo.agents.observations import TeamObserver
 from cavsumo.agents.policy_file import TrainedPolicy, read_policy
 from cavsumo.errors import InputError, UnknownName
@@ -21,8 +21,6 @@ from cavsumo.model.objects import factory_of, is_object
 from cavsumo.model.registry import Parameter, Registry
 from cavsumo.model.scene import Scene
 from cavsumo.model.snapshot import Snapshot
-
-PREFIX = "policy:"
 
 
 def make_agent(spec: str, params: Mapping[str, Any]) -> Agent:
@@ -57,15 +55,6 @@ def _alone(name: str) -> Registry[Agent]:
     alone: Registry[Agent] = Registry("agent")
     alone.register(name)(factory_of(name, f"agent {name}"))
     return alone
-
-
-def policy_file(spec: str) -> Path | None:
-    """The file of ``policy:FILE``, None for any other name."""
-    if not spec.startswith(PREFIX):
-        return None
-    if spec == PREFIX:
-        raise InputError(f"agent {spec!r}: expected the file of a policy, {PREFIX}FILE")
-    return Path(spec.removeprefix(PREFIX))
 
 
 class PolicyAgent(Agent):

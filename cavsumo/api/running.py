@@ -10,9 +10,9 @@ from typing import Any
 
 from cavsumo.api.keywords import settings_of
 from cavsumo.api.results import Results, TemporaryFolder
-from cavsumo.batch.executors import Means
+from cavsumo.batch.manner import Manner, Means
 from cavsumo.batch.playing import played
-from cavsumo.batch.preflight import Manner, checked
+from cavsumo.batch.preflight import checked
 from cavsumo.batch.progress import is_shown
 from cavsumo.errors import InputError
 from cavsumo.model.named_networks import DEFAULT

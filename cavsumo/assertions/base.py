@@ -4,52 +4,20 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from typing import ClassVar
 
 from cavsumo.assertions.contacts import Contact
+from cavsumo.assertions.judgement import HELD as HELD  # the protocol has all of these
+from cavsumo.assertions.judgement import INVALID as INVALID
+from cavsumo.assertions.judgement import NOT_TRIGGERED as NOT_TRIGGERED
+from cavsumo.assertions.judgement import SEVERITY as SEVERITY
+from cavsumo.assertions.judgement import UNFAIR as UNFAIR
+from cavsumo.assertions.judgement import VIOLATED as VIOLATED
+from cavsumo.assertions.judgement import Judgement as Judgement
 from cavsumo.assertions.names import ASSERTION_NAMES
 from cavsumo.model.registry import Registry
 from cavsumo.model.scene import Scene
 from cavsumo.model.snapshot import Snapshot
-
-# Verdicts, the most serious first: how several assertions make one outcome.
-VIOLATED, UNFAIR, HELD, NOT_TRIGGERED = "violated", "unfair", "held", "not_triggered"
-INVALID = "invalid"  # of an episode in which a tester broke the rules of the world (``validity``)
-SEVERITY = (VIOLATED, UNFAIR, HELD, NOT_TRIGGERED)
-
-
-@dataclass(frozen=True, slots=True)
-class Judgement:
-    """The judgement of an assertion about an episode.
-
-    Attributes:
-        assertion: its name.
-        verdict: ``not_triggered``: the precondition never held; ``held``: it did and the ego
-            satisfied the assertion; ``violated``: it did and the ego violated the assertion;
-            ``unfair``: the ego could not have avoided the contact.
-        tester: id of the body involved, if any.
-        trigger_time, violation_time: when the precondition began to hold, when the assertion was
-            violated [s].
-        ego_speed: speed of the ego at the violation, else at the trigger [m/s].
-        impact_speed: closing speed of a contact [m/s].
-        robustness: the ego's smallest margin to a violation since the trigger, in the assertion's
-            unit, negative if and only if violated; None before the trigger.
-    """
-
-    assertion: str
-    verdict: str = NOT_TRIGGERED
-    tester: str = ""
-    trigger_time: float | None = None
-    violation_time: float | None = None
-    ego_speed: float | None = None
-    impact_speed: float | None = None
-    robustness: float | None = None
-
-    @property
-    def triggered(self) -> bool:
-        """Whether the episode was a test in the seed's sense."""
-        return self.verdict in (HELD, VIOLATED)
 
 
 class Assertion:

@@ -15,6 +15,7 @@ from cavsumo.assertions.names import is_formula
 from cavsumo.errors import InputError
 from cavsumo.model.plugins import imported, source_file
 from cavsumo.model.registry import Registry
+from cavsumo.model.scenario import Scenario
 
 # Forms of an assertion's name besides a registered name, for listings.
 FORMS: Mapping[str, str] = {
@@ -23,6 +24,13 @@ FORMS: Mapping[str, str] = {
     "NAME=FORMULA": "temporal logic over named signals: --formula or [formulas] in the scenario "
     "file (docs/formulas.md)",
 }
+
+
+def assertions_of(scenario: Scenario) -> tuple[Assertion, ...]:
+    """The assertions of a scenario; see ``make_assertions``."""
+    return make_assertions(
+        scenario.assertions, scenario.assertion_params, scenario.formulas, scenario.step_length
+    )
 
 
 def make_assertions(

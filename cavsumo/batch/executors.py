@@ -2,49 +2,17 @@
 
 from __future__ import annotations
 
-import importlib.util
 import logging
 from collections.abc import Iterator
 from concurrent.futures import Executor, ThreadPoolExecutor
 from contextlib import contextmanager
-from dataclasses import dataclass
 from typing import Any
 
+from cavsumo.batch.manner import Means, is_client
 from cavsumo.batch.worker import Worker, close_all, join_group
 from cavsumo.errors import InputError
 
 CONNECT_S = 10.0  # time limits for finding a scheduler, and its first worker
-EXECUTORS = ("local", "dask")
-
-
-@dataclass(frozen=True)
-class Means:
-    """The means of playing episodes, which never change the results.
-
-    Attributes:
-        jobs: how many at a time; None for the executor's number.
-        executor: "local" or "dask", or an existing executor: one of
-            ``concurrent.futures``, or a dask ``Client``.
-        scheduler: address of dask's scheduler.
-    """
-
-    jobs: int | None = None
-    executor: Any = "local"
-    scheduler: str | None = None
-
-    def __post_init__(self) -> None:
-        if self.jobs is not None and self.jobs < 1:
-            raise InputError(f"jobs: expected a number of at least 1, got {self.jobs}")
-        ours = isinstance(self.executor, str) and self.executor in EXECUTORS
-        if not (ours or isinstance(self.executor, Executor) or _is_client(self.executor)):
-            raise InputError(
-                "executor: expected a concurrent.futures.Executor or a dask Client, got "
-                f"{self.executor!r}"
-            )
-        if (ours and self.executor == "dask") != (self.scheduler is not None):
-            raise InputError("--executor dask and --scheduler ADDRESS go together")
-        if self.executor == "dask" and importlib.util.find_spec("distributed") is None:
-            raise InputError("--executor dask needs a library: pip install 'cavsumo[dask]'")
 
 
 @contextmanager
@@ -58,16 +26,11 @@ def opened(means: Means) -> Iterator[tuple[Executor, int]]:
             yield executor, means.jobs or threads
     elif isinstance(means.executor, Executor):
         yield means.executor, means.jobs or int(getattr(means.executor, "_max_workers", 1))
-    elif _is_client(means.executor):
+    elif is_client(means.executor):
         yield means.executor.get_executor(), means.jobs or sum(means.executor.ncores().values())
     else:
         with local_executor(means.jobs or 1) as executor:
             yield executor, means.jobs or 1
-
-
-def _is_client(executor: Any) -> bool:
-    """Whether an object is a client of dask, which need not be installed."""
-    return hasattr(executor, "get_executor") and hasattr(executor, "ncores")
 
 
 @contextmanager

@@ -7,16 +7,15 @@ from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
-from cavsumo.batch.located import present_paths
+from cavsumo.batch.ended import Ended
 from cavsumo.batch.preflight import check_kept
 from cavsumo.batch.prepared import OUTPUTS
-from cavsumo.batch.replay import Record, recorded_plan
-from cavsumo.batch.summary import Ended
 from cavsumo.batch.tally import Tally
 from cavsumo.errors import InputError, ResultsError
-from cavsumo.model.scenario import BatchPlan
-from cavsumo.results.provenance import differences, input_files
+from cavsumo.results.present import input_files, present_paths
+from cavsumo.results.provenance import differences
 from cavsumo.results.reading import ego_log_name, inside, whole_lines
+from cavsumo.results.recorded_plan import recorded_plan
 from cavsumo.results.rows import Outcome
 from cavsumo.results.writing import Recorder
 
@@ -50,9 +49,9 @@ def merged(
         for run, part, row in _in_order(parts):
             files = _trace_of(parts[part], row), _log_of(parts[part], run)
             tally.add(recorder.write(Outcome(row | {"run": run}, *files)))
-        facts = {"episodes": tally.rows, "counts": tally.all.outcomes}
+        facts = tally.facts()
         recorder.finish("finished", facts)
-    return Ended("", output, tally, recorder.traces)
+    return Ended("", output, tally, recorder.traces, str(whole["plan"].get("reference", "none")))
 
 
 def _whole_manifest(parts: Sequence[Path]) -> dict[str, Any]:
@@ -81,26 +80,22 @@ def _whole_manifest(parts: Sequence[Path]) -> dict[str, Any]:
 
 def _inputs(parts: Sequence[Path], warn: Callable[[str], None]) -> dict[str, Path]:
     """The inputs of the batch by their checksums, each from the first part that has it."""
-    records = [Record(*_planned(part), file=part) for part in parts]
-    names, sums = input_files(records[0].plan), records[0].origin.get("sha256") or {}
+    plan, manifest = recorded_plan(parts[0])
+    sums = dict(manifest.get("sha256") or {})
     found: dict[str, Path] = {}
-    for name, was in names.items():
-        for record in records if name in sums else ():
+    for name, was in input_files(plan).items():
+        problem = None
+        for part in parts if name in sums else ():
             try:
-                found[sums[name]] = present_paths(record, [name]).get(name, was)
-                break
+                places = present_paths(plan, manifest, part, [name])
             except InputError as error:
-                problem = error
-        else:
-            if name in sums:
-                warn(f"{problem}; the whole is without it")
+                problem = problem or error
+            else:
+                found[sums[name]] = places.get(name, was)
+                break
+        if name in sums and sums[name] not in found:
+            warn(f"{problem}; the whole is without it")
     return found
-
-
-def _planned(part: Path) -> tuple[BatchPlan, dict[str, str], None, dict[str, Any]]:
-    """The plan and the manifest of a part, as a record of no episode."""
-    plan, manifest = recorded_plan(part)
-    return plan, {}, None, manifest
 
 
 def _check_whole(parts: Sequence[Path], whole: dict[str, Any]) -> None:

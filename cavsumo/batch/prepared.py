@@ -17,7 +17,7 @@ import numpy as np
 
 from cavsumo.agents.casting import Cast, resolve_cast
 from cavsumo.agents.manoeuvres import types_for
-from cavsumo.assertions import make_assertions
+from cavsumo.assertions.specs import assertions_of
 from cavsumo.batch.plan_names import check_names
 from cavsumo.egos import make_ego
 from cavsumo.egos.base import Ego
@@ -29,7 +29,8 @@ from cavsumo.model.scenario import BatchPlan, Scenario
 from cavsumo.network.site import Site, Wishes, derive_site
 from cavsumo.network.traffic import Volume
 from cavsumo.network.traffic_lights import Pace
-from cavsumo.results.provenance import checksums, input_files, traffic_checksum, unequal, versions
+from cavsumo.results.present import input_files
+from cavsumo.results.provenance import checksums, traffic_checksum, unequal, versions
 from cavsumo.sumo.demand import BEYOND_S
 from cavsumo.sumo.options import OPTIONS
 
@@ -119,9 +120,7 @@ def prepare(plan: BatchPlan, ego: Ego | None = None) -> PreparedBatch:
     cast = resolve_cast(plan)
     for member in cast:
         member.make().prepare()
-    make_assertions(
-        scenario.assertions, scenario.assertion_params, scenario.formulas, scenario.step_length
-    )
+    assertions_of(scenario)
     kind = kind_named(scenario.kind)
     _check_kind(scenario, kind, cast)
     if cast.learners and (plan.shard or plan.reset == "shared"):

@@ -18,7 +18,8 @@ from cavsumo.errors import DivergenceError, ResultsError
 from cavsumo.model.bodies import STEERING, THROTTLE
 from cavsumo.model.scenario import BatchPlan
 from cavsumo.results.columns import COLUMNS, Row
-from cavsumo.results.reading import STARTING, inside, read_manifest, read_rows
+from cavsumo.results.reading import inside, read_rows
+from cavsumo.results.recorded_plan import recorded_plan
 from cavsumo.results.rows import cell
 from cavsumo.results.traces import NOT_REPLAYED, Trace, parsed, read_trace
 
@@ -84,17 +85,6 @@ def recorded(csv_file: Path, run: int, allowed: Collection[str] | None = ()) -> 
     row = recorded_row(csv_file, run)
     trace = read_trace(inside(csv_file, row["trace"])) if row.get("trace") else None
     return Record(plan, row, trace, manifest, csv_file, allowed=allowed)
-
-
-def recorded_plan(csv_file: Path) -> tuple[BatchPlan, dict[str, Any]]:
-    """The plan of a batch, and its manifest."""
-    manifest = read_manifest(csv_file)
-    if manifest.get("status") == STARTING:
-        raise ResultsError(f"results {str(csv_file)!r}: a batch that was killed as it started")
-    try:
-        return BatchPlan.model_validate(manifest["plan"]), manifest
-    except (KeyError, ValueError) as error:
-        raise ResultsError(f"manifest of {str(csv_file)!r}: holds no valid plan") from error
 
 
 def recorded_row(csv_file: Path, run: int) -> dict[str, str]:

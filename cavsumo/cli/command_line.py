@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import argparse
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
 from typing import Any, NoReturn
 
 from cavsumo import __version__
 from cavsumo.cli.options import adders
-from cavsumo.errors import BatchError, CavsumoError, DivergenceError, Exit, InputError
+from cavsumo.errors import BatchError, CavsumoError, DivergenceError, Exit, InputError, UnknownName
 
 HYPHENATED = ("--bbox", "--ego-route", "--junction")  # options whose values may begin with "-"
 
@@ -17,11 +17,14 @@ HYPHENATED = ("--bbox", "--ego-route", "--junction")  # options whose values may
 def main(argv: Sequence[str] | None = None) -> int:
     """The command ``cavsumo``; returns the exit status."""
     try:
-        words = sys.argv[1:] if argv is None else argv
+        words = _joined(sys.argv[1:] if argv is None else argv)
+        parser = _parser()
         if not words:
-            _parser().print_help()
+            parser.print_help()
             return Exit.USAGE
-        options = _parser().parse_args(_joined(words))
+        if words[0][:1] != "-" and words[0] not in parser.commands:
+            raise UnknownName("command", words[0], parser.commands)
+        options = parser.parse_args(words)
         status: int = options.command(options)
         return status
     except DivergenceError as error:
@@ -55,10 +58,12 @@ class _OptionParser(argparse.ArgumentParser):
     """argparse with errors in one sentence and exit status 2.
 
     Attributes:
+        commands: the names of the commands, of the parser that has them.
         fill: adds the options of a command whose options are read from the scenario record, once
             that command is called; the help of all commands does without them.
     """
 
+    commands: Collection[str] = ()
     fill: Callable[[argparse.ArgumentParser], None] | None = None
 
     def parse_known_args(self, args: Any = None, namespace: Any = None) -> Any:
@@ -71,7 +76,7 @@ class _OptionParser(argparse.ArgumentParser):
         raise InputError(f"{message} (see {self.prog} --help)")
 
 
-def _parser() -> argparse.ArgumentParser:
+def _parser() -> _OptionParser:
     parser = _OptionParser(
         prog="cavsumo",
         description="Which tests make this vehicle fail at this junction, are they fair, and how "
@@ -90,6 +95,7 @@ def _parser() -> argparse.ArgumentParser:
         listing = commands.add_parser(sort, help=text, description=text, allow_abbrev=False)
         listing.add_argument("name", nargs="?", help="show the parameters of this one")
         listing.set_defaults(command=_list, sort=sort)
+    parser.commands = commands.choices
     return parser
 
 

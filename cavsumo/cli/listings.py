@@ -6,7 +6,17 @@ from collections.abc import Mapping
 from inspect import Parameter
 from typing import Any
 
+from cavsumo.agents.names import AGENT_NAMES, policy_file
+from cavsumo.assertions.names import ASSERTION_NAMES
+from cavsumo.egos.names import EGO_NAMES, EXTERNAL_NAMES
+from cavsumo.model.names import Names
 from cavsumo.model.registry import Registry
+
+NAMES: Mapping[str, Names] = {
+    "agents": AGENT_NAMES,
+    "egos": EGO_NAMES,
+    "assertions": ASSERTION_NAMES,
+}
 
 
 def registries() -> dict[str, Registry[Any]]:
@@ -20,6 +30,8 @@ def registries() -> dict[str, Registry[Any]]:
 
 def listing(sort: str, name: str | None) -> str:
     """One line for each entry, or one entry with its parameters, defaults and units."""
+    if name is not None and ":" not in name and not (sort == "egos" and name in EXTERNAL_NAMES):
+        NAMES[sort].check(name)
     registry = registries()[sort]
     if sort == "agents" and name is not None and name.startswith("policy:"):
         return _policy(name)
@@ -73,7 +85,6 @@ def _registry_of(ego: str, registered: Registry[Any]) -> Registry[Any]:
 
 def _policy(spec: str) -> str:
     """The description of a policy file."""
-    from cavsumo.agents.policy import policy_file
     from cavsumo.agents.policy_file import read_policy
 
     file = policy_file(spec)

@@ -11,3 +11,5 @@ EGO_NAMES = Names(
         "time-gap": "time_gap",
     },
 )
+# What may stand before a colon: egos in other processes.
+EXTERNAL_NAMES = Names("ego", "cavsumo.egos.external", {"exec": "ego", "tcp": "ego"})

@@ -8,12 +8,14 @@ machines. A file of that name takes precedence; a folder does not, since traces 
 from __future__ import annotations
 
 import importlib.resources
+import shlex
 from pathlib import Path
 
-from cavsumo.errors import UnknownName
+from cavsumo.errors import InputError, UnknownName
 
 DEFAULT = "crossing"
 ENDING = ".net.xml"
+OSM_ENDINGS = (".osm", ".osm.xml", ".osm.gz", ".osm.xml.gz", ".osm.bz2", ".pbf")
 ROUTES = Path("cavsumo/data/routes")  # stands for the folder of their demand
 
 
@@ -33,7 +35,14 @@ def network_file(net: Path) -> Path:
 
 
 def check_network(net: Path, source: str = "") -> None:
-    """Raise UnknownName for a word that is neither a path nor the name of a network."""
+    """Raise InputError for an unknown name of a network, and for OpenStreetMap data."""
+    if net.name.lower().endswith(OSM_ENDINGS):
+        target = net.name.split(".")[0] + ENDING
+        command = shlex.join(["cavsumo", "import-osm", str(net), "-o", target])
+        place = f"{source}: " if source else ""
+        raise InputError(
+            f"{place}{str(net)!r} is OpenStreetMap data; make a network of it: {command}"
+        )
     if is_word(net) and not net.exists() and not is_named(net):
         raise UnknownName("network", str(net), names(), source)
 

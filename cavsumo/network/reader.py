@@ -6,14 +6,12 @@ no side of the road is taken for granted.
 
 from __future__ import annotations
 
-import gzip
 import html
 import xml.sax
 import zlib
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path as FilePath
 from typing import Any
-from xml.etree import ElementTree
 
 import shapely
 import sumolib
@@ -22,6 +20,7 @@ from shapely.geometry import LineString, Polygon
 from cavsumo.errors import NetworkError, UnknownName
 from cavsumo.model.carriageway import Roads
 from cavsumo.model.polyline import Path, Point
+from cavsumo.network.network_file import root_of
 
 # Junction interiors leave slivers between the lanes that cross them; closing by this much [m]
 # makes the carriageway one surface without reaching over a kerb.
@@ -140,11 +139,7 @@ def read_network(file: FilePath, *, foes: bool = False) -> Network:
 
     ``foes``: with the tables of right of way, which take long on large networks.
     """
-    if file.is_dir():
-        raise NetworkError(f"network {str(file)!r}: is a folder, expected a .net.xml")
-    if not file.is_file():
-        raise NetworkError(f"network {str(file)!r}: no such file{_neighbours(file)}")
-    root = _root(file)
+    root = root_of(file)
     try:
         net = sumolib.net.readNet(
             str(file),
@@ -236,29 +231,6 @@ def interior(network: Network, link: Any) -> list[Any]:
         onward = via.getOutgoing()
         link = onward[0] if onward else None
     return lanes
-
-
-def _root(file: FilePath) -> dict[str, str]:
-    """The attributes of a network's <net>; refuses what is not XML, or other XML."""
-    opener = gzip.open if file.suffix == ".gz" else open
-    try:
-        with opener(file, "rb") as stream:
-            _, root = next(ElementTree.iterparse(stream, events=("start",)))
-    except (ElementTree.ParseError, OSError, EOFError, zlib.error) as error:
-        raise NetworkError(f"network {str(file)!r}: not well-formed XML: {error}") from error
-    if root.tag != "net":
-        raise NetworkError(
-            f"network {str(file)!r}: a SUMO network begins with <net>, this file with <{root.tag}>"
-        )
-    return dict(root.attrib)
-
-
-def _neighbours(file: FilePath) -> str:
-    """The names of the networks in the folder of the missing one."""
-    if not file.parent.is_dir():
-        return ""
-    found = sorted(p.name for p in file.parent.glob("*.net.xml*"))
-    return f"; {str(file.parent)!r} holds {', '.join(found[:6])}" if found else ""
 
 
 def _one_line(error: BaseException) -> str:

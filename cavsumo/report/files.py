@@ -3,32 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 
 from cavsumo.errors import InputError
 from cavsumo.report.analysis import Report, analyse
 from cavsumo.report.formats import FORMATS
 from cavsumo.report.junit import junit
-
-
-@dataclass(frozen=True)
-class ReportOptions:
-    """The options of a report.
-
-    Attributes:
-        by: the column whose values are reported separately.
-        format: of the text that is printed or written to output.
-        output, junit, html: files to write.
-        replays: number of failures with pages of their own.
-    """
-
-    by: str = "agent"
-    format: str = "table"
-    output: Path | None = None
-    junit: Path | None = None
-    html: Path | None = None
-    replays: int = 20
+from cavsumo.report.order import ReportOptions, check_report
 
 
 def write_report_files(results: Sequence[Path], wanted: ReportOptions) -> str:
@@ -36,10 +17,7 @@ def write_report_files(results: Sequence[Path], wanted: ReportOptions) -> str:
 
     Raises InputError; nothing is written when anything is wrong.
     """
-    for option in ("output", "junit", "html"):
-        _check_output(f"--{option}", getattr(wanted, option), results)
-    if wanted.replays < 0:
-        raise InputError(f"--replays: expected at least 0, got {wanted.replays}")
+    check_report(results, wanted)
     write_page = _page_writer() if wanted.html is not None else None
     found = analyse(results, wanted.by)
     text = FORMATS[wanted.format](found)
@@ -65,19 +43,6 @@ def _page_writer() -> Callable[[Report, Path, int], None]:
             "--html needs the package matplotlib: pip install 'cavsumo[plot]'"
         ) from None
     return write_report
-
-
-def _check_output(option: str, file: Path | None, results: Sequence[Path]) -> None:
-    """Refuse to write over the results or into nowhere."""
-    if file is None:
-        return
-    if not file.parent.is_dir():
-        raise InputError(f"{option} {str(file)!r}: no such folder {str(file.parent)!r}")
-    own = [path for csv_file in results for path in (csv_file, csv_file.with_suffix(".json"))]
-    if file.resolve() in [path.resolve() for path in own]:
-        raise InputError(f"{option} {str(file)!r}: is one of the results")
-    if file.is_dir():
-        raise InputError(f"{option} {str(file)!r}: is a folder")
 
 
 def _write(option: str, file: Path, text: str) -> None:

@@ -11,12 +11,12 @@ from typing import Any
 
 import pandas
 
-from cavsumo.batch.replay import recorded_plan
 from cavsumo.batch.stopping import looks_at_rows
 from cavsumo.errors import ResultsError, UnknownName
 from cavsumo.model.scenario import BatchPlan
 from cavsumo.results.columns import COLUMNS
 from cavsumo.results.reading import whole_lines
+from cavsumo.results.recorded_plan import recorded_plan
 
 OUTCOMES = ("violated", "held", "unfair", "not_triggered", "invalid", "error")
 # The columns that a report needs; others are read only on request.
@@ -27,6 +27,9 @@ NUMBERS = (
     "impact_speed_mps",
     "wall_s",
     "avoidable",
+    "arrived",
+    "lost_s",
+    "stood_s",
 )
 WORDS = (
     "agent",
@@ -37,6 +40,7 @@ WORDS = (
     "verdicts",
     "tester",
     "reference",
+    "frozen",
     "trace",
     "error",
 )

@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING, Any
 
-from cavsumo.assertions.base import INVALID, VIOLATED, Judgement
+from cavsumo.assertions.judgement import INVALID, VIOLATED, Judgement
 from cavsumo.results.column import Column, FinishedEpisode, Measured
 
 if TYPE_CHECKING:

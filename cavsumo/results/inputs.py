@@ -26,6 +26,7 @@ from cavsumo.errors import ResultsError
 from cavsumo.model.own_folders import OwnFolder
 
 FOLDER = "inputs"
+TRACE = ".jsonl"  # how the name of a trace ends
 LARGEST = 512 * 2**20  # bytes; a larger file is not kept, and no more of one is decompressed
 TOO_LARGE = f"has more than {LARGEST // 2**20} MiB and is not kept: a replay elsewhere needs it too"
 LEVEL = 6  # of compression; 9 takes three times as long for 2 % less
@@ -35,6 +36,11 @@ STEM = 80  # characters of a name before its digits
 SHA256 = re.compile(r"[0-9a-f]{64}")
 NAME = rf"(?P<stem>[\w+-]*)-(?P<digits>[0-9a-f]{{{DIGITS}}})(?P<endings>[\w.+-]*)\.gz"
 KEPT = re.compile(NAME, re.ASCII)
+
+
+def inputs_folder(file: Path) -> Path:
+    """The folder of the inputs that are kept with a results file, or with a trace."""
+    return (file.parent if file.suffix == TRACE else file.with_suffix("")) / FOLDER
 
 
 def kept_name(file: Path, sha: str) -> str:

@@ -10,11 +10,10 @@ from pathlib import Path
 from typing import Any
 
 from cavsumo import __version__
-from cavsumo.agents.policy import policy_file
 from cavsumo.assertions.specs import assertion_files
 from cavsumo.egos.specs import ego_files
 from cavsumo.model.checksums import checksum
-from cavsumo.model.scenario import BatchPlan, Scenario
+from cavsumo.model.scenario import Scenario
 from cavsumo.network.site import Site
 
 # Settings that determine how much of a batch is played, not its episodes.
@@ -32,21 +31,6 @@ def checksums(scenario: Scenario, agent_files: Iterable[Path]) -> dict[str, str]
     programs = (*ego_files(scenario.ego), *assertion_files(scenario.assertions))
     found |= {str(file): file for file in programs}
     return {name: checksum(file) for name, file in found.items()}
-
-
-def input_files(plan: BatchPlan) -> dict[str, Path]:
-    """The files that an episode is played from besides programs: their names, present paths.
-
-    The network, routes, additional files, policies, and files that agents' parameters may name.
-    """
-    scenario = plan.scenario
-    found = {str(scenario.net): scenario.net_file}
-    if scenario.routes is not None and scenario.routes_file is not None:
-        found[str(scenario.routes)] = scenario.routes_file
-    policies = [file for file in map(policy_file, plan.cast.values()) if file is not None]
-    named = [Path(value) for value in plan.params.values() if isinstance(value, str)]
-    files = (*scenario.additional, *policies, *named)
-    return found | {str(file): scenario.present(file) for file in files}
 
 
 def versions() -> dict[str, str]:

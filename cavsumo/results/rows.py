@@ -12,7 +12,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from cavsumo.assertions.base import HELD, VIOLATED
+from cavsumo.assertions.judgement import HELD, VIOLATED
 from cavsumo.results.columns import COLUMNS, Row
 
 

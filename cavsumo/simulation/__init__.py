@@ -1,5 +1,6 @@
 """One episode: its requirements (``setup``), its timesteps (``loop``), rewards, avoidability.
 
-A violated episode is played again with a reference driver in ``avoidability``. No file here deals
-with files, processes or batches. To measure something new in every episode: ``loop.Episode``.
+``playback`` plays an episode again from its record; ``avoidability`` does so with a reference
+driver where an episode was violated. No file here deals with files, processes or batches.
+To measure something new in every episode: ``loop.Episode``.
 """

@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from cavsumo.agents.casting import teams, tester_bodies
-from cavsumo.assertions import make_assertions
 from cavsumo.assertions.base import Assertion
+from cavsumo.assertions.specs import assertions_of
 from cavsumo.egos import make_ego
 from cavsumo.egos.base import Ego, Mission
 from cavsumo.model.bodies import Body
@@ -54,12 +54,7 @@ def make_setup(scenario: Scenario, site: Site, ego: Ego | None = None) -> Setup:
         world=World(scenario, site, ego),
         site=site,
         ego=ego,
-        assertions=make_assertions(
-            scenario.assertions,
-            scenario.assertion_params,
-            scenario.formulas,
-            scenario.step_length,
-        ),
+        assertions=assertions_of(scenario),
         teams=teams(scenario),
         bodies=tester_bodies(scenario),
     )

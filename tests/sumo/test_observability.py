@@ -224,7 +224,7 @@ def test_bad_sensors_are_one_sentence(
     """It names the sensor, the key and what was expected; nothing is written."""
     sentence = refused("--ego", "time-gap", option, word)
     assert said in sentence
-    assert option.removeprefix("--").replace("-", "_") in sentence
+    assert option.removeprefix("--").replace("-", "_") in sentence.replace("-", "_")
 
 
 def test_what_is_no_sensor_in_a_file_is_refused(networks: dict[str, Path]) -> None:

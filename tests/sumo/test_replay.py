@@ -233,7 +233,7 @@ def test_a_learners_episode_can_be_replayed(networks: dict[str, Path], tmp_path:
     run(settings | {"trace": "all", "end": 5.0}, file, Means(), Manner(quiet=True, exit_zero=True))
     assert replay(file, ReplayOptions(5)) == Exit.OK
     alone = file.with_suffix("") / "run000005.jsonl"
-    assert replay(alone) == Exit.OK  # what it knew before is in its trace
+    assert replay(alone, ReplayOptions()) == Exit.OK  # what it knew before is in its trace
 
 
 @pytest.mark.parametrize(

@@ -15,8 +15,8 @@ from cavsumo.assertions.formulas.nodes import (
     Until,
     walk,
 )
-from cavsumo.assertions.formulas.semantics import steps_of
 from cavsumo.assertions.formulas.signals import SIGNALS
+from cavsumo.assertions.formulas.steps import steps_of
 from cavsumo.assertions.formulas.syntax import parse
 from cavsumo.assertions.formulas.words import Text
 from cavsumo.errors import InputError

@@ -42,7 +42,6 @@ from cavsumo.assertions.formulas.nodes import (
     Connective,
     Constant,
     Function,
-    Interval,
     Not,
     Number,
     NumberNode,
@@ -51,11 +50,11 @@ from cavsumo.assertions.formulas.nodes import (
     TruthNode,
     Until,
 )
+from cavsumo.assertions.formulas.steps import steps_of
 from cavsumo.assertions.formulas.windows import Values, largest_ahead
 
 Trace = Mapping[str, Values]
 TINY = sys.float_info.min  # the smallest number that is kept at full precision
-STEP_TOLERANCE = 1e-9  # of a timestep
 
 
 class Bounds(NamedTuple):
@@ -127,17 +126,6 @@ def _bounds(formula: TruthNode, view: View) -> Bounds:
             return _until(formula, view)
         case Temporal():
             return _temporal(formula, view)
-
-
-def steps_of(within: Interval, dt: float) -> tuple[int, int | None]:
-    """The first and the last timestep within an interval, None for no last one.
-
-    The first is after the last if the interval falls between two timesteps.
-    """
-    begin = math.ceil(within.begin / dt - STEP_TOLERANCE)
-    if math.isinf(within.end):
-        return begin, None
-    return begin, math.floor(within.end / dt + STEP_TOLERANCE)
 
 
 def _known(values: Values) -> Bounds:

@@ -9,12 +9,14 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from cavsumo.model.carriageway import Light
 from cavsumo.model.geometry import gap, overlap
-from cavsumo.model.scene import Scene
 from cavsumo.model.snapshot import BodyState, RawState, Snapshot
+
+if TYPE_CHECKING:
+    from cavsumo.model.carriageway import Light
+    from cavsumo.model.scene import Scene
 
 SHOWN = {"G": 1.0, "g": 1.0, "r": -1.0}  # by SUMO's letter; other letters are 0
 

@@ -12,17 +12,15 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from cavsumo.agents import AGENTS
 from cavsumo.agents.casting import params_of, resolve_cast, teams
-from cavsumo.agents.policy import policy_file
+from cavsumo.batch.certify.tested_names import check_test
 from cavsumo.batch.jobs import Memory
+from cavsumo.batch.planned import recorded_settings
 from cavsumo.batch.playback import recording_of
-from cavsumo.batch.preflight import recorded_settings
 from cavsumo.batch.replay import Record, known, prepared_again, replayed
 from cavsumo.batch.worker import Worker
-from cavsumo.errors import InputError, ResultsError, UnknownName
+from cavsumo.errors import InputError, ResultsError
 from cavsumo.model.carriageway import StartRecord
-from cavsumo.model.labels import cast_of
 from cavsumo.model.scenario import BatchPlan, Params
 from cavsumo.results.provenance import EXTENT
 from cavsumo.results.traces import Trace
@@ -96,12 +94,7 @@ def of_policy(
         when = "" if after is None or not memory else f", as it knew after run {after}"
         words = f"agent {word} of {file}{when}"
         return Subject(words, _word(plan, word), params_of(plan, word) | params, memory)
-    try:
-        ((_, name),) = cast_of((word,)).items()
-    except ValueError as error:
-        raise InputError(f"agent {error}") from error
-    if policy_file(name) is None and name not in AGENTS:
-        raise UnknownName("run, agent or policy:FILE", word, {*plan.cast, *AGENTS}, str(file))
+    check_test(word, plan, file)
     return Subject(f"agent {word}", word, params, {})
 
 

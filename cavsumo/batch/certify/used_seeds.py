@@ -14,12 +14,12 @@ from typing import Any
 
 import numpy as np
 
-from cavsumo.batch.located import present_paths
-from cavsumo.batch.replay import Record, recorded_plan
 from cavsumo.errors import InputError, ResultsError
 from cavsumo.model.scenario import BatchPlan
 from cavsumo.model.seeds import episode_seed
+from cavsumo.results.present import present_paths
 from cavsumo.results.reading import FORMAT, rows_of
+from cavsumo.results.recorded_plan import recorded_plan
 
 SUMO_SEEDS = 2**31
 ATTEMPTS = 100  # batches that are tried; each fails only if two seeds agree by chance
@@ -78,10 +78,9 @@ def used(results: Sequence[Path], params: Mapping[str, Any]) -> Used:
 def _kept(plan: BatchPlan, manifest: Mapping[str, Any], csv_file: Path) -> dict[str, Path]:
     """The present paths of the files that parameters name and that are not where they were."""
     found: dict[str, Path] = {}
-    record = Record(plan, {}, None, manifest, csv_file)
     for name in {value for value in plan.params.values() if isinstance(value, str)}:
         with contextlib.suppress(InputError):  # it is nowhere: then nothing learned from it either
-            found |= present_paths(record, [str(Path(name))])
+            found |= present_paths(plan, manifest, csv_file, [str(Path(name))])
     return found
 
 

@@ -8,13 +8,12 @@ import json
 import sys
 import tempfile
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from rich.console import Console
 
-from cavsumo.agents.policy import policy_file
+from cavsumo.agents.names import policy_file
 from cavsumo.batch.certify.certificate import (
     TriggerCertificate,
     as_json,
@@ -25,80 +24,38 @@ from cavsumo.batch.certify.certificate import (
 from cavsumo.batch.certify.ego_list import Egos, choices, opponents
 from cavsumo.batch.certify.tested_policy import Subject, of_policy, of_run, settings_of
 from cavsumo.batch.certify.used_seeds import Used, fresh_seed, used
-from cavsumo.batch.executors import Means
-from cavsumo.batch.located import located, present_paths
+from cavsumo.batch.located import located
+from cavsumo.batch.manner import Manner, Means
 from cavsumo.batch.playing import played
-from cavsumo.batch.preflight import CheckedBatch, Manner, checked
+from cavsumo.batch.preflight import CheckedBatch, checked
 from cavsumo.batch.prepared import PreparedBatch
-from cavsumo.batch.replay import Record, prepared_again, recorded, recorded_plan
+from cavsumo.batch.replay import Record, prepared_again, recorded
 from cavsumo.batch.trust import check_trust
 from cavsumo.cli.commands.run import announce, exit_status
+from cavsumo.cli.requests.certify import CertifyOptions
 from cavsumo.egos import make_ego
 from cavsumo.errors import Exit, InputError
 from cavsumo.model.bodies import kind_named
 from cavsumo.model.labels import cast_of, labelled
-from cavsumo.model.scenario import BatchPlan, Params
+from cavsumo.model.scenario import BatchPlan
 from cavsumo.model.seeds import starts_generator
 from cavsumo.model.study import Part, product
 from cavsumo.network.recorded_starts import recorded_start
-from cavsumo.results.provenance import input_files
+from cavsumo.results.present import present_paths
+from cavsumo.results.recorded_plan import recorded_plan
 
 FORMAT = 1  # of the JSON; raised when a key changes its meaning or goes
 WIDTH = 120
 
 
-@dataclass(frozen=True)
-class CertifyOptions:
-    """Options of the command.
-
-    Attributes:
-        results, test: the source of the test; a run's number or an agent.
-        starts: "kept" or "fresh"; None for the default.
-        open_loop: the run's recorded actions instead of its agent.
-        param: parameters of the agent in place of its own.
-        egos: as on the command line.
-        ego_param: their parameters, ``LABEL.KEY``.
-        trust: use external egos and assertions that only the results name.
-        runs, seed: episodes per ego, and the seed from which theirs are drawn.
-        apart: other results whose seeds are not to be used.
-        confidence: of the bounds for all egos together.
-        jobs: episodes at a time.
-        output: results file; None keeps none.
-        resume, overwrite, exit_zero, quiet: see ``Manner``.
-        as_json: as JSON instead of a table.
-    """
-
-    results: Path
-    test: str
-    starts: str | None = None
-    open_loop: bool = False
-    param: Params = dataclasses.field(default_factory=dict)
-    egos: Sequence[str] = ()
-    ego_param: Params = dataclasses.field(default_factory=dict)
-    trust: bool = False
-    runs: int = 100
-    seed: int = 1
-    apart: Sequence[Path] = ()
-    confidence: float = 0.95
-    jobs: int | None = None
-    output: Path | None = None
-    resume: bool = False
-    overwrite: bool = False
-    exit_zero: bool = False
-    quiet: bool = False
-    as_json: bool = False
-
-
 def certify(order: CertifyOptions) -> int:
     """Play the test and print the bounds; all checks precede the first written file."""
-    _check(order)
     means = Means(order.jobs)
     plan, manifest = recorded_plan(order.results)
     egos = opponents(order.egos, order.ego_param, plan.scenario)
     check_trust(plan.scenario, order.results, _allowed(order), ego=not order.egos)
     seeds = used([order.results, *order.apart], order.param)
-    batch = Record(plan, {}, None, manifest, order.results)
-    places = present_paths(batch, input_files(plan))
+    places = present_paths(plan, manifest, order.results)
     subject, record = _subject(order, plan, manifest)
     seed = fresh_seed(order.seed, order.runs, seeds.seeds)
     parts = _parts(order, manifest, subject, egos, seed)
@@ -124,23 +81,6 @@ def certify(order: CertifyOptions) -> int:
 
 
 # Checked
-
-
-def _check(order: CertifyOptions) -> None:
-    """Refuse wrong options."""
-    if not 0.0 < order.confidence < 1.0:
-        raise InputError(f"--confidence: expected a share below 1, got {order.confidence:g}")
-    if order.runs < 1:
-        raise InputError(f"--runs: expected at least 1, got {order.runs}")
-    if not 0 <= order.seed < 2**63:
-        raise InputError(f"--seed: expected a number from 0 to 2^63 - 1, got {order.seed}")
-    if order.resume and order.output is None:
-        raise InputError("--resume: which results? name them with -o FILE")
-    if order.open_loop and order.starts == "fresh":
-        raise InputError("--open-loop: recorded actions need the starts that they were chosen for")
-    if not order.test.isdecimal() and (order.open_loop or order.starts == "kept"):
-        what = "--open-loop" if order.open_loop else "--starts kept"
-        raise InputError(f"{what}: {order.test!r} is no run, of which actions and starts are known")
 
 
 def _check_batches(

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 import io
 import json
 import math
@@ -21,6 +20,7 @@ from rich.progress import Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
 from rich.table import Table
 from rich.text import Text
 
+from cavsumo.cli.requests.game import SolveOptions
 from cavsumo.errors import Exit, InputError
 from cavsumo.games.approach import Tell
 from cavsumo.games.files import read_game
@@ -33,42 +33,10 @@ from cavsumo.games.solve import NotCertified, Solution, Unsolvable, solve
 FORMAT = 1  # of the JSON; raised when a key changes its meaning or goes
 SHOWN = 60  # states in the table
 EVERY_S = 10.0  # between lines of progress where there is no terminal
-SUFFIXES = (".png", ".svg", ".pdf")
-
-
-@dataclasses.dataclass(frozen=True)
-class SolveOptions:
-    """Options of the command.
-
-    Attributes:
-        file: the game.
-        reading: A, B or C.
-        precision: largest distance of the bounds.
-        trim: solve the solvable part.
-        as_json: as JSON instead of a table.
-        picture: file to draw the game's tree into.
-        policy_picture: file to draw the policy into.
-        time_limit: seconds after which to give up, None: never.
-        quiet: no progress.
-    """
-
-    file: Path
-    reading: str
-    precision: float
-    trim: bool
-    as_json: bool
-    picture: Path | None
-    policy_picture: Path | None
-    time_limit: float | None
-    quiet: bool
 
 
 def solve_file(order: SolveOptions) -> int:
     """Solve the game in a file and print the solution."""
-    if not (math.isfinite(order.precision) and order.precision > 0):
-        raise InputError(f"--precision: expected a positive number, got {order.precision:g}")
-    if order.time_limit is not None and not order.time_limit > 0:
-        raise InputError(f"--time-limit: expected positive seconds, got {order.time_limit:g}")
     painters = _painters(order)
     try:
         with _progress(order.quiet) as tell, _stdout_kept():
@@ -128,12 +96,6 @@ def _painters(order: SolveOptions) -> list[tuple[Any, Path]]:
     for option, file, name in wanted:
         if file is None:
             continue
-        if file.suffix.lower() not in SUFFIXES:
-            raise InputError(
-                f"{option} {str(file)!r}: expected a name ending in .png, .svg or .pdf"
-            )
-        if not file.parent.is_dir():
-            raise InputError(f"{option} {str(file)!r}: no such folder {str(file.parent)!r}")
         try:
             from cavsumo.games import pictures
         except ImportError:

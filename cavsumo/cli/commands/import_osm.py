@@ -9,10 +9,10 @@ import sys
 import tempfile
 from collections.abc import Iterator
 from contextlib import suppress
-from dataclasses import dataclass
 from pathlib import Path
 
 from cavsumo import __version__
+from cavsumo.cli.requests.import_osm import ImportOptions, log_file
 from cavsumo.errors import Exit, InputError
 from cavsumo.network.facts import Facts, facts
 from cavsumo.network.osm.extract import Box, find_roads, parse_box, write_roads
@@ -44,37 +44,10 @@ ZEBRA_OPTIONS = (
     "output.original-names",
     f"output-file={ZEBRA_NET}",
 )
-ENDINGS = (".net.xml", ".net.xml.gz")
-
-
-@dataclass(frozen=True)
-class ImportOptions:
-    """Options of the command.
-
-    Attributes:
-        source: the extract.
-        output: the network to write.
-        bbox: west, south, east, north as written, or None for the whole extract.
-        left_hand: traffic keeps left; None to decide by the extract.
-        keep_pedestrian_signals: keep traffic lights that only stop cars for pedestrians.
-        zebra: pedestrians have priority on crossings without traffic lights.
-        overwrite: replace another network.
-        time_limit_s: time limit of netconvert [s].
-    """
-
-    source: Path
-    output: Path
-    bbox: str | None
-    left_hand: bool | None
-    keep_pedestrian_signals: bool
-    zebra: bool
-    overwrite: bool
-    time_limit_s: float
 
 
 def import_osm(order: ImportOptions) -> int:
     """Make the network; files are written only after success."""
-    _check(order)
     box = None if order.bbox is None else parse_box(order.bbox)
     roads = find_roads(order.source, box)
     found = side(roads.hints, box or roads.bounds or (0, 0, 0, 0))
@@ -91,7 +64,7 @@ def import_osm(order: ImportOptions) -> int:
         network = _with_notice((folder / NET).read_text(encoding="utf-8"), order, options)
         (folder / NET).write_text(network, encoding="utf-8", newline="\n")
         made = facts(read_network(folder / NET))
-    log = _log_file(order.output)
+    log = log_file(order.output)
     _publish(order, network, "".join(f"{line}\n" for line in said), log)
     remarks = [*about, *(f"note: {note}" for note in made.notes)]
     for line in [*remarks, *warning_summary(said, log)]:
@@ -113,19 +86,6 @@ def _about_side(found: Side, asked: bool | None) -> Iterator[str]:
             )
     elif found.left:
         yield f"note: {found.words}: imported for left-hand traffic; --right-hand is the other side"
-
-
-def _check(order: ImportOptions) -> None:
-    """Refuse a path that cannot become a network file, before any work."""
-    output = order.output
-    if not output.name.endswith(ENDINGS) or output.name in ENDINGS:
-        raise InputError(f"output {str(output)!r}: expected a name that ends in .net.xml")
-    if not output.parent.is_dir():
-        raise InputError(f"output {str(output)!r}: no such folder {str(output.parent)!r}")
-    for file in (output, _log_file(output)):
-        if file.is_dir():
-            raise InputError(f"output {str(output)!r}: its place is taken by a folder")
-    sumo_home()
 
 
 def _options(order: ImportOptions, box: Box | None) -> list[str]:
@@ -213,11 +173,6 @@ def _write(file: Path, data: bytes) -> None:
     finally:
         with suppress(OSError):
             part.unlink()
-
-
-def _log_file(output: Path) -> Path:
-    """The log beside a network."""
-    return output.with_name(output.name.removesuffix(".gz").removesuffix(".xml") + ".log")
 
 
 def _what_was_made(output: Path, made: Facts) -> str:

@@ -15,10 +15,11 @@ from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
+from cavsumo.cli.requests.inspect import InspectOptions
 from cavsumo.cli.steps import SlowSteps
 from cavsumo.egos.base import EGO_KIND
 from cavsumo.errors import Exit, InputError, NetworkError
-from cavsumo.model.named_networks import check_network, network_file
+from cavsumo.model.named_networks import network_file
 from cavsumo.network.facts import Facts, facts
 from cavsumo.network.inspection import (
     InspectedNetwork,
@@ -35,29 +36,8 @@ FORMAT = 1  # of the JSON; raised when a key changes its meaning or goes
 WIDTH = 120
 
 
-@dataclasses.dataclass(frozen=True)
-class InspectOptions:
-    """Options of the command.
-
-    Attributes:
-        net: the network.
-        junction: id of the only junction to show, None for the best.
-        top: number of junctions to show.
-        as_json: as JSON instead of a table.
-        picture: file to draw the first junction into.
-    """
-
-    net: Path
-    junction: str | None
-    top: int
-    as_json: bool
-    picture: Path | None
-
-
 def inspect(look: InspectOptions) -> int:
     """Describe a network."""
-    if look.top < 1:
-        raise InputError(f"--top: expected at least 1, got {look.top}")
     draw = _drawing(look.picture)
     with SlowSteps(quiet=draw is None) as steps:
         found, here, junctions = _seen(look, steps)
@@ -75,7 +55,6 @@ def inspect(look: InspectOptions) -> int:
 def _seen(look: InspectOptions, steps: SlowSteps) -> tuple[Facts, InspectedNetwork, list[Junction]]:
     """The facts and junctions of a network."""
     steps.begin(f"reading {look.net}")
-    check_network(look.net)
     network = read_network(network_file(look.net))
     try:
         found = facts(network)
@@ -108,12 +87,6 @@ def _drawing(picture: Path | None) -> Any:
     """The function that draws, if a picture is requested; InputError if it is impossible."""
     if picture is None:
         return None
-    if picture.suffix.lower() not in (".png", ".svg", ".pdf"):
-        raise InputError(
-            f"--picture {str(picture)!r}: expected a name ending in .png, .svg or .pdf"
-        )
-    if not picture.parent.is_dir():
-        raise InputError(f"--picture {str(picture)!r}: no such folder {str(picture.parent)!r}")
     try:
         from cavsumo.network.drawing.picture import draw
     except ImportError:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import sys
-from dataclasses import dataclass
 from pathlib import Path
 
 from cavsumo.batch.located import located
@@ -19,51 +18,16 @@ from cavsumo.batch.replay import (
 )
 from cavsumo.batch.shown import shown_site
 from cavsumo.batch.worker import Worker
+from cavsumo.cli.requests.replay import TRACE, ReplayOptions
 from cavsumo.errors import Exit, InputError
 from cavsumo.interop.fcd import write_fcd
 from cavsumo.network.site import Site
 from cavsumo.results.provenance import changes
 from cavsumo.results.traces import Trace
 
-TRACE = ".jsonl"  # how the name of a trace ends
 
-
-@dataclass(frozen=True)
-class ReplayOptions:
-    """Options of the command.
-
-    Attributes:
-        run: number of the episode in results; None when a trace is given.
-        net, routes: where the network and the routes are, if not where they were.
-        recorded: take the trace as it is and play nothing.
-        playback: play its recorded actions and traffic instead of asking its agents.
-        trust: play it even if that runs, imports or connects to what only the file names.
-        html, fcd: files to write.
-        gui: show it in sumo-gui, with so many milliseconds a timestep.
-    """
-
-    run: int | None = None
-    net: Path | None = None
-    routes: Path | None = None
-    recorded: bool = False
-    playback: bool = False
-    trust: bool = False
-    html: Path | None = None
-    fcd: Path | None = None
-    gui: bool = False
-    delay: float | None = None
-
-    @property
-    def shown(self) -> bool:
-        """Whether the trace is needed."""
-        return bool(self.html or self.fcd or self.gui)
-
-
-def replay(file: Path, wanted: ReplayOptions = ReplayOptions()) -> int:
+def replay(file: Path, wanted: ReplayOptions) -> int:
     """Play an episode again and show it; raises DivergenceError where it first differs."""
-    for option, output in (("--html", wanted.html), ("--fcd", wanted.fcd)):
-        if output is not None and not output.parent.is_dir():
-            raise InputError(f"{option} {str(output)!r}: no such folder {str(output.parent)!r}")
     if wanted.gui:
         from cavsumo.interop.gui import check_gui
 
@@ -92,11 +56,8 @@ def _found(file: Path, wanted: ReplayOptions) -> Record:
     """The episode that is meant."""
     allowed = None if wanted.trust else ()
     if file.suffix == TRACE:
-        if wanted.run is not None:
-            raise InputError(f"replay: {str(file)!r} is the trace of one episode; no run is named")
         return recorded_alone(file, allowed, anew=not wanted.playback)
-    if wanted.run is None:
-        raise InputError(f"replay: which run of {str(file)!r}? name its number")
+    assert wanted.run is not None
     return recorded(file, wanted.run, allowed)
 
 

@@ -7,7 +7,8 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from cavsumo.errors import Exit
-from cavsumo.report.files import ReportOptions, write_report_files
+from cavsumo.report.files import write_report_files
+from cavsumo.report.order import ReportOptions
 
 
 def report(results: Sequence[Path], wanted: ReportOptions) -> int:

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import argparse
-import dataclasses
 from pathlib import Path
 from typing import Any
+
+from cavsumo.cli.options.values import values_of
 
 
 def add_certify(commands: Any) -> None:
@@ -123,11 +124,15 @@ def _add_output(group: Any) -> None:
 
 
 def _certify(options: argparse.Namespace) -> int:
-    from cavsumo.cli.commands.certify import CertifyOptions, certify
+    from cavsumo.cli.requests.certify import CertifyOptions, check_certify
     from cavsumo.cli.setting_options import assignment
 
-    given = {f.name: getattr(options, f.name) for f in dataclasses.fields(CertifyOptions)}
+    given = values_of(options, CertifyOptions)
     given["egos"] = tuple(word for words in options.egos or () for word in words)
     given["param"] = dict(assignment("--param", word) for word in options.param)
     given["ego_param"] = dict(assignment("--ego-param", word) for word in options.ego_param)
-    return certify(CertifyOptions(**given))
+    order = CertifyOptions(**given)
+    check_certify(order)
+    from cavsumo.cli.commands.certify import certify
+
+    return certify(order)

@@ -43,7 +43,12 @@ def _settings() -> list[Setting]:
 
 
 def _check_ego(options: argparse.Namespace) -> int:
-    from cavsumo.cli.commands.check_ego import check_ego
+    from cavsumo.batch.planned import check_plan
     from cavsumo.cli.setting_options import given
+    from cavsumo.model.scenario import plan_from
 
-    return check_ego({"ego": options.ego, **given(options, _settings())}, options.deadline)
+    settings = {"ego": options.ego, **given(options, _settings())}
+    check_plan(plan_from(settings, "check-ego"))
+    from cavsumo.cli.commands.check_ego import check_ego
+
+    return check_ego(settings, options.deadline)

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import argparse
-import dataclasses
 from pathlib import Path
 from typing import Any
+
+from cavsumo.cli.options.values import values_of
 
 
 def add_game(commands: Any) -> None:
@@ -56,8 +57,10 @@ def add_game(commands: Any) -> None:
 
 
 def _solve(options: argparse.Namespace) -> int:
-    from cavsumo.cli.commands.game import SolveOptions, solve_file
+    from cavsumo.cli.requests.game import SolveOptions, check_solve
 
-    return solve_file(
-        SolveOptions(**{f.name: getattr(options, f.name) for f in dataclasses.fields(SolveOptions)})
-    )
+    order = SolveOptions(**values_of(options, SolveOptions))
+    check_solve(order)
+    from cavsumo.cli.commands.game import solve_file
+
+    return solve_file(order)

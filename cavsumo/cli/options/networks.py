@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import argparse
-import dataclasses
 from pathlib import Path
 from typing import Any
 
+from cavsumo.cli.options.values import values_of
 from cavsumo.model.named_networks import names
 
 
@@ -73,17 +73,20 @@ def add_import_osm(commands: Any) -> None:
 
 
 def _inspect(options: argparse.Namespace) -> int:
-    from cavsumo.cli.commands.inspect import InspectOptions, inspect
+    from cavsumo.cli.requests.inspect import InspectOptions, check_inspect
 
-    return inspect(
-        InspectOptions(
-            **{f.name: getattr(options, f.name) for f in dataclasses.fields(InspectOptions)}
-        )
-    )
+    look = InspectOptions(**values_of(options, InspectOptions))
+    check_inspect(look)
+    from cavsumo.cli.commands.inspect import inspect
+
+    return inspect(look)
 
 
 def _import_osm(options: argparse.Namespace) -> int:
-    from cavsumo.cli.commands.import_osm import ImportOptions, import_osm
+    from cavsumo.cli.requests.import_osm import ImportOptions, check_import
 
-    values = {f.name: getattr(options, f.name) for f in dataclasses.fields(ImportOptions)}
-    return import_osm(ImportOptions(**values))
+    order = ImportOptions(**values_of(options, ImportOptions))
+    check_import(order)
+    from cavsumo.cli.commands.import_osm import import_osm
+
+    return import_osm(order)

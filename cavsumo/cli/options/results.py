@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import argparse
-import dataclasses
 from pathlib import Path
 from typing import Any
+
+from cavsumo.cli.options.values import values_of
 
 
 def add_replay(commands: Any) -> None:
@@ -102,25 +103,30 @@ def add_merge(commands: Any) -> None:
 
 
 def _replay(options: argparse.Namespace) -> int:
-    from cavsumo.cli.commands.replay import ReplayOptions, replay
+    from cavsumo.cli.requests.replay import ReplayOptions, check_replay
 
-    names = [field.name for field in dataclasses.fields(ReplayOptions)]
-    return replay(
-        options.results, ReplayOptions(**{name: getattr(options, name) for name in names})
-    )
+    wanted = ReplayOptions(**values_of(options, ReplayOptions))
+    check_replay(options.results, wanted)
+    from cavsumo.cli.commands.replay import replay
+
+    return replay(options.results, wanted)
 
 
 def _report(options: argparse.Namespace) -> int:
-    from cavsumo.cli.commands.report import report
-    from cavsumo.report.files import ReportOptions
+    from cavsumo.report.order import ReportOptions, check_report
 
-    names = [field.name for field in dataclasses.fields(ReportOptions)]
-    return report(
-        options.results, ReportOptions(**{name: getattr(options, name) for name in names})
-    )
+    wanted = ReportOptions(**values_of(options, ReportOptions))
+    check_report(options.results, wanted)
+    from cavsumo.cli.commands.report import report
+
+    return report(options.results, wanted)
 
 
 def _merge(options: argparse.Namespace) -> int:
+    from cavsumo.results.reading import read_manifest
+
+    for part in options.parts:
+        read_manifest(part)
     from cavsumo.cli.commands.merge import merge
 
     return merge(options.parts, options.output, options.overwrite, options.quiet)

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import argparse
-import dataclasses
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
+
+from cavsumo.cli.options.values import values_of
 
 if TYPE_CHECKING:
     from cavsumo.model.scenario.fields import Setting
@@ -69,7 +70,7 @@ def _add_output(add: Callable[..., Any]) -> None:
     add("--resume", action="store_true", help="go on where the results end, or start")
     add("--retry-errors", action="store_true", help="play the episodes again that ended in errors")
     add("--overwrite", action="store_true", help="start again in place of what is there")
-    add("--exit-zero", action="store_true", help="a violation is no failure")
+    add("--exit-zero", action="store_true", help="exit with 0 whatever the ego did")
     add("-q", "--quiet", action="store_true", help="no progress, no summary")
 
 
@@ -82,14 +83,14 @@ OTHERS: Mapping[str, Callable[[Callable[..., Any]], None]] = {
 
 
 def _run(options: argparse.Namespace) -> int:
-    from cavsumo.batch.executors import Means
-    from cavsumo.batch.preflight import Manner
-    from cavsumo.cli.commands.run import run_study
+    from cavsumo.batch.manner import Manner, Means
+    from cavsumo.batch.planned import planned
     from cavsumo.cli.scenario_settings import parts_of
 
-    named = {
-        f.name: getattr(options, f.name) for f in dataclasses.fields(Manner) if f.name in options
-    }
-    manner = Manner(**named, scratch=options.output is None)
+    manner = Manner(**values_of(options, Manner), scratch=options.output is None)
     means = Means(options.jobs, options.executor, options.scheduler)
-    return run_study(parts_of(options), Path(options.output or SCRATCH), means, manner)
+    batches = planned(parts_of(options), Path(options.output or SCRATCH), manner)
+    # What can be refused quickly has been; now comes what takes long to import.
+    from cavsumo.cli.commands.run import run_study
+
+    return run_study(batches, means, manner)

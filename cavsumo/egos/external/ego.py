@@ -20,6 +20,7 @@ from cavsumo.egos.external.child import Child
 from cavsumo.egos.external.link import ExtraLineError, GoneError, Link, Tail
 from cavsumo.egos.external.protocol import shown
 from cavsumo.egos.external.wire import Wire, host_and_port
+from cavsumo.egos.names import EXTERNAL_NAMES
 from cavsumo.errors import EgoError, InputError
 from cavsumo.model.checks import number
 from cavsumo.model.registry import Registry
@@ -27,7 +28,7 @@ from cavsumo.model.scene import Scene
 from cavsumo.model.snapshot import Snapshot
 
 DAY_S = 86400.0
-EXTERNAL: Registry[ExternalEgo] = Registry("ego")
+EXTERNAL: Registry[ExternalEgo] = Registry(EXTERNAL_NAMES)
 
 
 class ExternalEgo(Ego, ABC):

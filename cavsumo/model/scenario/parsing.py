@@ -14,6 +14,7 @@ from cavsumo.model.scenario.fields import settings as offered
 from cavsumo.model.scenario.plan import BatchPlan
 from cavsumo.model.scenario.record import Scenario
 from cavsumo.model.scenario.sensor import Sensor
+from cavsumo.model.sumo_configuration import with_configuration
 
 SCENARIO_KEYS = frozenset(Scenario.model_fields)
 PLAN_KEYS = frozenset(BatchPlan.model_fields) - {"scenario"}
@@ -29,11 +30,12 @@ def plan_from(
 
     A route file that lies beside the network (``routes/NAME.rou.xml`` next to its folder) is
     found when none is named and no traffic is to be drawn; ``routes = "none"`` keeps the roads
-    empty.
+    empty. A SUMO configuration in place of a network gives network, routes and additional files.
     """
     check_keys(settings, source)
     if "net" not in settings:
         raise InputError(f"{source}: no network given; name one with --net FILE")
+    settings = with_configuration(settings, source)
     places = places or {}
     if str(settings["net"]) not in places:
         check_network(Path(settings["net"]), source)

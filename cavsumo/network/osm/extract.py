@@ -170,11 +170,16 @@ def write_roads(file: Path, roads: RoadExtract, target: TextIO) -> None:
     target.write("</osm>\n")
 
 
-def read_items(file: Path) -> Iterator[Item]:
-    """The items of an extract in the order of the file; raises InputError in one sentence."""
+def check_extract(file: Path) -> None:
+    """Raise InputError unless the file is there."""
     if not file.is_file():
         what = "is a folder" if file.is_dir() else "no such file"
         raise InputError(f"extract {str(file)!r}: {what}")
+
+
+def read_items(file: Path) -> Iterator[Item]:
+    """The items of an extract in the order of the file; raises InputError in one sentence."""
+    check_extract(file)
     if file.suffix == ".pbf":
         yield from _pbf_items(file)
         return

@@ -1,0 +1,1 @@
+"""Options of each command as a record, with a check before heavy imports."""
