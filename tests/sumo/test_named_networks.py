@@ -10,7 +10,8 @@ from pathlib import Path
 import pytest
 from support import ROOT, content
 
-from cavsumo.batch.replay import located, recorded_alone
+from cavsumo.batch.located import located
+from cavsumo.batch.replay import recorded_alone
 from cavsumo.cli import main
 from cavsumo.errors import InputError, UnknownName
 from cavsumo.model import named_networks

@@ -14,13 +14,13 @@ from typing import Any
 import pytest
 
 from cavsumo.batch.executors import Means
+from cavsumo.batch.located import located
 from cavsumo.batch.preflight import Manner
 from cavsumo.batch.prepared import prepare
 from cavsumo.batch.replay import (
     Record,
     Replayed,
     compare,
-    located,
     recorded,
     recorded_alone,
     replayed,
@@ -426,8 +426,8 @@ def test_the_files_of_a_trace_can_be_named(
     for name in ("crossing.net.xml", "crossing.rou.xml"):
         (tmp_path / name).unlink()
     found = located(recorded_alone(file), networks["crossing"], routes["crossing"])
-    assert found.plan.scenario.net == networks["crossing"]
-    assert found.plan.scenario.routes == routes["crossing"]
+    assert found.plan.scenario.net_file == networks["crossing"]
+    assert found.plan.scenario.routes_file == routes["crossing"]
 
 
 @pytest.mark.parametrize(
@@ -502,6 +502,6 @@ def _copied(csv_file: Path, folder: Path) -> Path:
     traces.mkdir()
     for source in (csv_file, csv_file.with_suffix(".json")):
         (folder / source.name).write_bytes(source.read_bytes())
-    for source in csv_file.with_suffix("").iterdir():
+    for source in csv_file.with_suffix("").glob("run*"):
         (traces / source.name).write_bytes(source.read_bytes())
     return folder / csv_file.name
