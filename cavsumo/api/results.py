@@ -167,7 +167,7 @@ class Results:
 
     @cached_property
     def _summary(self) -> ResultsSummary:
-        """What is said of them."""
+        """The summary of the results."""
         tally, judged = Tally(), self.plan.reference != "none"
         for _, row in whole_lines(self.file):
             if row is not None:

@@ -16,12 +16,12 @@ class Ended:
     Attributes:
         name: which part of a study it is; empty for none.
         csv_file, tally, traces: its results, what was found, how many traces there are.
-        reference: the driver by whom failures were judged, "none" if they were not.
+        reference: the driver that judged the failures, "none" if they were not judged.
         sequential: the number of episodes may depend on what they found, so the intervals must
             hold however it was decided to stop.
         shared: episodes shared simulations, and those played in a fresh one are found tests.
         cut_short: somebody stopped it.
-        promises: by agent, against whom its forecasts hold.
+        promises: by agent, the class of egos for which its forecasts hold.
     """
 
     name: str

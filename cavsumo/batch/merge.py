@@ -14,7 +14,7 @@ from cavsumo.batch.tally import Tally
 from cavsumo.errors import InputError, ResultsError
 from cavsumo.results.present import input_files, present_paths
 from cavsumo.results.provenance import differences
-from cavsumo.results.reading import ego_log_name, inside, whole_lines
+from cavsumo.results.reading import check_apart, ego_log_name, inside, whole_lines
 from cavsumo.results.recorded_plan import recorded_plan
 from cavsumo.results.rows import Outcome
 from cavsumo.results.writing import Recorder
@@ -35,8 +35,7 @@ def merged(
 
     ``warn`` is told of inputs that are not found, so that the whole is without them.
     """
-    if output.resolve() in [part.resolve() for part in parts]:
-        raise ResultsError(f"output {str(output)!r}: is one of the parts")
+    check_apart(output, parts)
     whole = _whole_manifest(parts)
     _check_whole(parts, whole)
     if not overwrite:

@@ -28,7 +28,7 @@ def failures(found: Found, judged: bool) -> str:
 
 
 def judgement(found: Found, reference: str) -> str:
-    """By whom failures were preventable, and apart from them the others; empty without any."""
+    """The driver that would have prevented failures, and the others apart; empty without any."""
     if not found.failures:
         return ""
     others = ((found.unpreventable, UNPREVENTABLE), (found.not_judged, NOT_JUDGED))
@@ -73,10 +73,10 @@ def frozen(found: Found) -> str:
 
 
 def event(row: Row) -> str:
-    """What happened in a test, when and with whom."""
+    """The event of a test, with its time and body."""
     violated = is_failure(row)
     when = float(row["violation_time_s"] if violated else row["trigger_time_s"])
     hit = violated and cell(row["impact_speed_mps"])
     what = "collision" if hit else f"{row['assertion']} {'violated' if violated else 'triggered'}"
-    whom = f" with {row['tester']}" if row["tester"] else ""
-    return f"{what} at {when:.1f} s{whom}"
+    tester = f" with {row['tester']}" if row["tester"] else ""
+    return f"{what} at {when:.1f} s{tester}"

@@ -78,7 +78,7 @@ def _table(ended: Sequence[Ended]) -> Table:
 
 
 def _others(ended: Sequence[Ended]) -> list[str]:
-    """What is counted apart: other failures, and what is no test."""
+    """The columns that are counted apart: other failures, and episodes that are no tests."""
     everything = found_by(one.tally.all for one in ended)
     judged = any(one.judged for one in ended)
     return [
@@ -193,7 +193,7 @@ def _say_forecasts(one: Ended, console: Console) -> None:
 
 
 def _say_failures(one: Ended, console: Console) -> None:
-    """By whom the failures of a batch were preventable, and apart from them the others."""
+    """Print the preventable failures of a batch, and apart from them the others."""
     said = sentences.judgement(one.tally.all, one.reference) if one.judged else ""
     if said:
         _say(console, _of(one) + said)
@@ -209,7 +209,7 @@ def _say_drive(one: Ended, console: Console) -> None:
 
 
 def _say_bound(ended: Sequence[Ended], console: Console) -> None:
-    """What is known where no failure was found; unpreventable ones apart."""
+    """Print the bound where no failure was found; unpreventable ones apart."""
     together, judged = found_by(one.tally.all for one in ended), _judged(ended)
     if not together.tests or together.preventable or together.not_judged:
         return

@@ -193,7 +193,7 @@ def found_by(agents: Iterable[Found]) -> Found:
 
 
 def tallied(rows: Iterable[Mapping[Any, Any]]) -> Found:
-    """What some rows found, whoever their agents are."""
+    """The counts of some rows, of any agents."""
     tally = Tally()
     for row in rows:
         tally.add(row)

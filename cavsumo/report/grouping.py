@@ -56,7 +56,7 @@ class Group(Told):
     Attributes:
         rows: its rows (``Evidence.rows``), by file and run.
         sequential: how many rows there are may depend on what they found.
-        reference: the driver by whom its failures were judged; empty if not all of them were.
+        reference: the driver that judged its failures; empty if not all of them were judged.
     """
 
     rows: pandas.DataFrame
@@ -101,7 +101,7 @@ def grouped(evidence: Evidence, by: str = "agent") -> list[Group]:
 
 
 def reference_of(batches: Sequence[Batch]) -> str:
-    """Who judged the failures of some batches; empty if not all of them were judged."""
+    """The driver that judged the failures of some batches; empty if not all of them were judged."""
     names = dict.fromkeys(batch.plan.reference for batch in batches)
     return "" if "none" in names else ", ".join(names)
 

@@ -57,7 +57,7 @@ def exit_status(ended: Sequence[Ended], interrupted: bool, exit_zero: bool) -> i
 
 
 def _reason(ended: Sequence[Ended]) -> str:
-    """What exit status 1 stands for, the preventable failures first."""
+    """The meaning of exit status 1, the preventable failures first."""
     judged = all(one.judged for one in ended)
     return sentences.exit_reason(found_by(one.tally.all for one in ended), judged)
 

@@ -64,7 +64,7 @@ def answers(report: Report) -> list[str]:
 
 
 def answer(one: Rates, who: str) -> str:
-    """What a group found, as a sentence."""
+    """The results of a group, as a sentence."""
     tests, failures = one.tests, one.preventable if one.reference else one.failures
     if not tests.total:
         return f"{who} played no valid episode."
@@ -82,7 +82,7 @@ def answer(one: Rates, who: str) -> str:
 
 
 def _judged(one: Rates) -> str:
-    """By whom the failures were preventable, and apart from them the others."""
+    """The driver that would have prevented the failures, and apart from them the others."""
     others = ((one.unpreventable.count, "unpreventable"), (one.not_judged, "not judged"))
     apart = ", ".join(f"{count} {kind}" for count, kind in others if count)
     said = f"preventable by {driver(one.reference)}"
