@@ -18,7 +18,7 @@ from cavsumo.errors import DivergenceError, ResultsError
 from cavsumo.model.bodies import STEERING, THROTTLE
 from cavsumo.model.scenario import BatchPlan
 from cavsumo.results.columns import COLUMNS, Row
-from cavsumo.results.reading import inside, read_rows
+from cavsumo.results.reading import inside, rows_of
 from cavsumo.results.recorded_plan import recorded_plan
 from cavsumo.results.rows import cell
 from cavsumo.results.traces import NOT_REPLAYED, Trace, parsed, read_trace
@@ -89,7 +89,7 @@ def recorded(csv_file: Path, run: int, allowed: Collection[str] | None = ()) -> 
 
 def recorded_row(csv_file: Path, run: int) -> dict[str, str]:
     """The row of an episode."""
-    rows = {row.get("run"): row for row in read_rows(csv_file)}
+    rows = {row.get("run"): row for row in rows_of(csv_file, filled=False)}
     if str(run) not in rows:
         raise ResultsError(f"results {str(csv_file)!r}: no run {run} among {len(rows)} rows")
     return rows[str(run)]

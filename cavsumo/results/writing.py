@@ -198,6 +198,11 @@ class Recorder:
     def _whole_rows(self, todo: Iterator[int]) -> Iterator[dict[str, str]]:
         """The existing rows, which must be the first ones of the batch."""
         for line, row in whole_lines(self.csv_file):
+            if row is None and line != HEADER.encode("utf-8"):
+                raise ResultsError(
+                    f"results {str(self.csv_file)!r}: were written by an earlier version, with "
+                    "fewer columns; this version reads them and does not go on with them"
+                )
             if row is not None:
                 expected = next(todo, None)
                 if row["run"] != str(expected):

@@ -210,20 +210,21 @@ def test_the_command_names_a_change_on_disk(
     assert said.count("\n") == 1
 
 
-def test_another_network_than_recorded_is_pointed_out(
+def test_another_version_is_pointed_out_and_another_network_refused(
     recording: Recording, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """The manifest knows the network's hash: a replay on a changed file says that it changed."""
+    """The manifest knows versions and checksums: only the recorded network is played on."""
     file = _copied(recording.csv_file, tmp_path)
     manifest = json.loads(file.with_suffix(".json").read_text(encoding="utf-8"))
     net = next(name for name in manifest["sha256"] if name.endswith(".net.xml"))
-    manifest["sha256"][net] = "0" * 64
     manifest["versions"]["libsumo"] = "1.0.0"
     file.with_suffix(".json").write_text(json.dumps(manifest), encoding="utf-8")
     assert replay(file, ReplayOptions(RUN)) == Exit.OK
-    said = capsys.readouterr().err
-    assert f"{net} was {'0' * 64}" in said
-    assert "libsumo was 1.0.0" in said
+    assert "libsumo was 1.0.0" in capsys.readouterr().err
+    manifest["sha256"][net] = "0" * 64
+    file.with_suffix(".json").write_text(json.dumps(manifest), encoding="utf-8")
+    with pytest.raises(InputError, match=r"sha256 a72e56a374a8, not the 'crossing.net.xml' \(sha25"):
+        replay(file, ReplayOptions(RUN))
 
 
 def test_a_learners_episode_can_be_replayed(networks: dict[str, Path], tmp_path: Path) -> None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 from cavsumo.batch.located import located
 from cavsumo.batch.replay import Record
@@ -43,6 +43,8 @@ def scenes(batches: Sequence[Batch]) -> list[BatchPlace]:
         key = repr((batch.plan.scenario, checksums))
         if key not in found:
             found[key] = _scene(batch)
+        elif found[key].site is None:  # its files may lie beside these results
+            found[key] = replace(_scene(batch), batches=found[key].batches)
         found[key].batches.append(i)
     return list(found.values())
 
