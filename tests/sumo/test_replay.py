@@ -223,7 +223,9 @@ def test_another_version_is_pointed_out_and_another_network_refused(
     assert "libsumo was 1.0.0" in capsys.readouterr().err
     manifest["sha256"][net] = "0" * 64
     file.with_suffix(".json").write_text(json.dumps(manifest), encoding="utf-8")
-    with pytest.raises(InputError, match=r"sha256 a72e56a374a8, not the 'crossing.net.xml' \(sha25"):
+    with pytest.raises(
+        InputError, match=r"sha256 a72e56a374a8, not the 'crossing.net.xml' \(sha25"
+    ):
         replay(file, ReplayOptions(RUN))
 
 
