@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import csv
 import json
+import re
 import shutil
 from collections.abc import Iterator
 from pathlib import Path
@@ -15,6 +16,7 @@ import pytest
 from support import content, rows, traces
 
 import cavsumo
+from cavsumo.batch.certify.used_seeds import used
 from cavsumo.cli import main
 from cavsumo.results.reading import FIRST, read_manifest
 
@@ -39,7 +41,7 @@ def moved(
     tmp_path_factory: pytest.TempPathFactory,
     inline: None,
 ) -> Path:
-    """The folder of a batch, its two shards and the page of a run, moved from where it was played."""
+    """The folder of a batch, its two shards and the page of a run, moved after it was played."""
     home, away = tmp_path_factory.mktemp("home"), tmp_path_factory.mktemp("away") / "batch"
     for folder, files in (("networks", networks), ("routes", routes)):
         (home / folder).mkdir()
@@ -120,9 +122,7 @@ def test_a_report_says_which_pages_it_cannot_make(
     (elsewhere / "results").mkdir()
     shutil.copytree(moved / "results" / "inputs", elsewhere / "results" / "inputs")
     text = file.read_text("utf-8")
-    file.write_text(
-        text.replace("results/run000000.jsonl", "").replace("results/run000001.jsonl", "")
-    )
+    file.write_text(re.sub(r"results/run\d+\.jsonl", "", text), "utf-8")
     assert main(["report", str(file), "--html", "report.html", "-o", "t.txt"]) == 0
     assert "pages of 1 of the listed runs: no trace of them was kept" in capsys.readouterr().err
 
@@ -201,8 +201,6 @@ def test_weights_are_carried(
     assert main(["replay", "results.csv", "1"]) == 0
     certify = ["certify", "results.csv", "q-learning", "--runs", "1", "-q", "--exit-zero"]
     assert main(certify) == 0
-    from cavsumo.batch.certify.used_seeds import used
-
     found = used([Path("results.csv")], {})
     assert len(found.seeds) == 4
     assert [str(file) for file in found.results] == ["results.csv", "school.csv"]
