@@ -21,9 +21,10 @@ from pathlib import Path
 from typing import Any
 
 from cavsumo.batch.executors import Means
+from cavsumo.batch.located import located
 from cavsumo.batch.playback import NOT_PLAYED_BACK, for_playback, playback_job, played_back
 from cavsumo.batch.preflight import Manner
-from cavsumo.batch.replay import Record, Replayed, compare, located, prepared_again, recorded_alone
+from cavsumo.batch.replay import Record, Replayed, compare, prepared_again, recorded_alone
 from cavsumo.batch.worker import Worker
 from cavsumo.cli.commands.run import run
 from cavsumo.errors import DivergenceError

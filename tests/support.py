@@ -59,7 +59,7 @@ def rows(file: Path) -> list[dict[str, str]]:
 
 def traces(file: Path) -> dict[str, str]:
     """The traces by name."""
-    return {f.name: f.read_text(encoding="utf-8") for f in file.with_suffix("").glob("*")}
+    return {f.name: f.read_text(encoding="utf-8") for f in file.with_suffix("").glob("run*")}
 
 
 def content(folder: Path) -> dict[str, bytes]:

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from cavsumo.agents.base import AGENTS, Agent
-from cavsumo.agents.names import policy_file
+from cavsumo.agents.names import PREFIX, policy_file
 from cavsumo.agents.policy import make_agent, parameters_of
 from cavsumo.errors import InputError, UnknownName
 from cavsumo.model.bodies import Body, kind_named, model_of
@@ -27,9 +27,9 @@ class CastMember:
     Attributes:
         label: what the plan and the rows call it.
         name: registered name, ``policy:FILE``, or the name of an object.
-        params: its parameters, as given.
+        params: its parameters; they and the name have the present paths of files.
         files: what it is made of: the file of a policy or of an object's class, and the files that
-            its parameters name.
+            its parameters name, as they were given.
         learns: whether its episodes change what it knows for the next.
         drives, promise, manoeuvre: as the agent declares them (``Agent``).
     """
@@ -94,24 +94,39 @@ def resolve_cast(plan: BatchPlan) -> Cast:
     for label, name in plan.cast.items():
         if label != name and label in AGENTS:
             raise InputError(f"agent {label}={name}: the label is the name of another agent")
-        agent = make_agent(name, params_of(plan, label))
+        present = _present(plan, label)
+        agent = make_agent(*present)
         try:
             agent.check_bodies(kind, each)
         except ValueError as error:
             raise InputError(f"agent {label}: {error}") from error
-        members.append(_member(plan, label, agent))
+        members.append(_member(plan, label, agent, *present))
     return Cast(tuple(members), len(teams(plan.scenario)))
 
 
-def _member(plan: BatchPlan, label: str, agent: Agent) -> CastMember:
+def _present(plan: BatchPlan, label: str) -> tuple[str, Params]:
+    """The name of an agent and its parameters, both with the present paths of files."""
+    name, params, scenario = plan.cast[label], params_of(plan, label), plan.scenario
+    file = policy_file(name)
+    if file is not None:
+        return f"{PREFIX}{scenario.present(file)}", params
+    named = getattr(AGENTS.get(name), "FILES", ()) if name in AGENTS else ()
+    files = {key: Path(str(params[key])) for key in named if key in params}
+    present = {key: scenario.present(file) for key, file in files.items()}
+    return name, params | {key: str(present[key]) for key in files if present[key] != files[key]}
+
+
+def _member(
+    plan: BatchPlan, label: str, agent: Agent, present: str, present_params: Params
+) -> CastMember:
     """An agent of a plan with the facts that one of it declares."""
     name, params = plan.cast[label], params_of(plan, label)
     own = source_file(name) if is_object(name) else policy_file(name)
     files = [] if own is None else [own]
     return CastMember(
         label,
-        name,
-        params,
+        present,
+        present_params,
         files=(*files, *(Path(str(params[key])) for key in agent.FILES if key in params)),
         learns=agent.learns and plan.known is None,
         drives=agent.drives,

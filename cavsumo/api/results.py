@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 from cavsumo.api.display import ResultsSummary, results_html, results_text
 from cavsumo.api.episodes import RecordedEpisode, as_recorded, played_again
-from cavsumo.batch.replay import located
+from cavsumo.batch.located import located
 from cavsumo.batch.replay import recorded as find_recorded
 from cavsumo.batch.tally import Tally
 from cavsumo.errors import InputError
@@ -130,8 +130,7 @@ class Results:
             InputError: there is no such run, no frame of it was kept, or a file is missing.
         """
         found = find_recorded(self.file, run, None if self.trusted else ())
-        if net is not None or routes is not None:
-            found = located(found, _path(net), _path(routes))
+        found = located(found, _path(net), _path(routes), shown=recorded)
         return as_recorded(found) if recorded else played_again(found)
 
     def report(self, file: str | os.PathLike[str], *, by: str = "agent", replays: int = 20) -> None:

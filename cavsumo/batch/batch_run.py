@@ -37,6 +37,7 @@ class BatchRun:
         tally: the counts, earlier sessions included.
         status: finished, stopped (by a rule), interrupted or broken.
         cut_short: whether the user stopped it before all errors were played again.
+        left_out: the inputs that are too large to be kept with the results.
     """
 
     prepared: PreparedBatch
@@ -48,6 +49,7 @@ class BatchRun:
     tally: Tally = field(default_factory=Tally)
     status: str = "broken"
     cut_short: bool = False
+    left_out: list[Path] = field(default_factory=list)
 
     def __post_init__(self) -> None:
         self._watch = OutputWatch(self.prepared.plan.scenario.ego, self.prepared.checksums)
@@ -57,6 +59,7 @@ class BatchRun:
         self._todo = self.prepared.plan.todo()
         self._knowledge = Knowledge(self.prepared, {})
         self.recorder.begin(manifest, overwrite=overwrite)
+        self.left_out = self.recorder.keep(self.prepared.inputs)
 
     def resume(self, manifest: Mapping[str, Any]) -> None:
         """Take up the recorded rows."""
@@ -67,6 +70,7 @@ class BatchRun:
             self.tally.add(row)
             self._knowledge.seen(row)
         self._knowledge.catch_up(self.executor)
+        self.left_out = self.recorder.keep(self.prepared.inputs)
         recorded = manifest["status"]
         self.status = recorded if recorded in COMPLETE else "interrupted"
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import heapq
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -11,8 +11,9 @@ from cavsumo.batch.ended import Ended
 from cavsumo.batch.preflight import check_kept
 from cavsumo.batch.prepared import OUTPUTS
 from cavsumo.batch.tally import Tally
-from cavsumo.errors import ResultsError
+from cavsumo.errors import InputError, ResultsError
 from cavsumo.model.documents import read_text
+from cavsumo.results.present import input_files, present_paths
 from cavsumo.results.provenance import differences
 from cavsumo.results.reading import check_apart, check_cells, ego_log_name, inside, whole_lines
 from cavsumo.results.recorded_plan import recorded_plan
@@ -24,16 +25,27 @@ APART = frozenset({"shard", "deadline_s", "budget_s"})  # settings in which part
 Numbered = tuple[int, int, dict[str, str]]  # run, which part, row
 
 
-def merged(parts: Sequence[Path], output: Path, *, overwrite: bool) -> Ended:
-    """Check that the parts are complete, then write the whole; raises ResultsError if not."""
+def merged(
+    parts: Sequence[Path],
+    output: Path,
+    *,
+    overwrite: bool,
+    warn: Callable[[str], None] = lambda said: None,
+) -> Ended:
+    """Check that the parts are complete, then write the whole; raises ResultsError if not.
+
+    ``warn`` is told of inputs that are not found, so that the whole is without them.
+    """
     check_apart(output, parts)
     whole = _whole_manifest(parts)
     _check_whole(parts, whole)
     if not overwrite:
         check_kept(output, whole)
+    inputs = _inputs(parts, warn)
     tally = Tally()
     with Recorder(output) as recorder:
         recorder.begin(whole, overwrite=overwrite)
+        recorder.keep(inputs)
         for run, part, row in _in_order(parts):
             files = _trace_of(parts[part], row), _log_of(parts[part], run)
             tally.add(recorder.write(Outcome(row | {"run": run}, *files)))
@@ -64,6 +76,26 @@ def _whole_manifest(parts: Sequence[Path]) -> dict[str, Any]:
         "plan": plan,
         "merged_from": [str(part) for part in parts],
     }
+
+
+def _inputs(parts: Sequence[Path], warn: Callable[[str], None]) -> dict[str, Path]:
+    """The inputs of the batch by their checksums, each from the first part that has it."""
+    plan, manifest = recorded_plan(parts[0])
+    sums = dict(manifest.get("sha256") or {})
+    found: dict[str, Path] = {}
+    for name, was in input_files(plan).items():
+        problem = None
+        for part in parts if name in sums else ():
+            try:
+                places = present_paths(plan, manifest, part, [name])
+            except InputError as error:
+                problem = problem or error
+            else:
+                found[sums[name]] = places.get(name, was)
+                break
+        if name in sums and sums[name] not in found:
+            warn(f"{problem}; the whole is without it")
+    return found
 
 
 def _check_whole(parts: Sequence[Path], whole: dict[str, Any]) -> None:

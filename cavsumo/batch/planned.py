@@ -16,6 +16,7 @@ from cavsumo.errors import InputError, ResultsError
 from cavsumo.model.scenario import BatchPlan, plan_from
 from cavsumo.model.study import Part
 from cavsumo.network.network_file import root_of
+from cavsumo.results.present import input_files, present_paths
 from cavsumo.results.reading import check_replaceable, read_manifest
 from cavsumo.results.writing import check_free
 
@@ -37,9 +38,17 @@ class PlannedBatch:
     recorded: Mapping[str, Any] | None
 
 
-def planned(parts: Sequence[Part], output: Path, manner: Manner) -> list[PlannedBatch]:
-    """Plan all parts of a run before any is played; raises InputError in one sentence."""
-    batches = [_planned(part, part.output(output), manner) for part in parts]
+def planned(
+    parts: Sequence[Part],
+    output: Path,
+    manner: Manner,
+    places: Mapping[str, Path] | None = None,
+) -> list[PlannedBatch]:
+    """Plan all parts of a run before any is played; raises InputError in one sentence.
+
+    ``places``: the present paths of files that the parts name (``Scenario.placed``).
+    """
+    batches = [_planned(part, part.output(output), manner, places or {}) for part in parts]
     for batch in batches:
         check_free(batch.output)
         if batch.recorded is None and not manner.overwrite:
@@ -53,13 +62,13 @@ def check_plan(plan: BatchPlan) -> None:
     root_of(plan.scenario.net_file)
 
 
-def _planned(part: Part, output: Path, manner: Manner) -> PlannedBatch:
+def _planned(part: Part, output: Path, manner: Manner, places: Mapping[str, Path]) -> PlannedBatch:
     """Plan one part."""
     _check_output(output)
     recorded = _recorded(output, manner)
     source = f"run: {part.name}" if part.name else "run"
     settings = {**part.defaults, **recorded_settings(recorded), **part.settings}
-    plan = plan_from(settings, source)
+    plan = plan_from(settings, source, {**places, **_moved(recorded, output)})
     check_plan(plan)
     return PlannedBatch(part.name, output, plan, recorded)
 
@@ -85,6 +94,19 @@ def _recorded(output: Path, manner: Manner) -> dict[str, Any] | None:
     if manner.resume and not rows and not output.with_suffix(".json").exists():
         return None  # a kill may leave an empty file
     return read_manifest(output)
+
+
+def _moved(recorded: Mapping[str, Any] | None, output: Path) -> dict[str, Path]:
+    """The present paths of the files of a batch to go on with, where none is at its place.
+
+    A file that was changed there since is none to go on with, so no other one is searched.
+    """
+    try:
+        plan = BatchPlan.model_validate((recorded or {})["plan"])
+    except (KeyError, ValueError):  # a new batch, or none to go on with
+        return {}
+    gone = [name for name, was in input_files(plan).items() if not was.is_file()]
+    return present_paths(plan, recorded or {}, output, gone)
 
 
 def recorded_settings(recorded: Mapping[str, Any] | None) -> dict[str, Any]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Callable, Sequence
 from concurrent.futures import Executor
 
@@ -16,6 +17,7 @@ from cavsumo.batch.stopping import looks_at_rows
 from cavsumo.batch.worker import try_out
 from cavsumo.egos.ego_files import OutputWatch
 from cavsumo.errors import CavsumoError, InputError
+from cavsumo.results.inputs import TOO_LARGE
 from cavsumo.results.writing import Recorder
 
 Announce = Callable[[CheckedBatch, int], None]  # a batch, and the jobs at a time
@@ -77,6 +79,8 @@ def _play(
             batch_run.resume({**batch.recorded, "plan": batch.manifest["plan"]})
         if not manner.quiet:
             announce(batch, jobs)
+        for file in batch_run.left_out:
+            print(f"cavsumo: {str(file)!r} {TOO_LARGE}", file=sys.stderr)
         _carry_out(batch_run, manner)
     return Ended(
         batch.name,

@@ -48,9 +48,17 @@ class CheckedBatch:
         )
 
 
-def checked(parts: Sequence[Part], output: Path, manner: Manner) -> list[CheckedBatch]:
-    """Check all batches of a run before any is played; raises InputError in one sentence."""
-    return prepared_batches(planned(parts, output, manner), manner)
+def checked(
+    parts: Sequence[Part],
+    output: Path,
+    manner: Manner,
+    places: Mapping[str, Path] | None = None,
+) -> list[CheckedBatch]:
+    """Check all batches of a run before any is played; raises InputError in one sentence.
+
+    ``places``: the present paths of files that the parts name (``Scenario.placed``).
+    """
+    return prepared_batches(planned(parts, output, manner, places), manner)
 
 
 def prepared_batches(batches: Sequence[PlannedBatch], manner: Manner) -> list[CheckedBatch]:

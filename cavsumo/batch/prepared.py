@@ -29,6 +29,7 @@ from cavsumo.model.scenario import BatchPlan, Scenario
 from cavsumo.network.site import Site, Wishes, derive_site
 from cavsumo.network.traffic import Volume
 from cavsumo.network.traffic_lights import Pace
+from cavsumo.results.present import input_files
 from cavsumo.results.provenance import checksums, traffic_checksum, unequal, versions
 from cavsumo.sumo.demand import BEYOND_S
 from cavsumo.sumo.options import OPTIONS
@@ -63,6 +64,12 @@ class PreparedBatch:
     def __post_init__(self) -> None:
         facts = (self.plan.model_dump_json(), self.folder, self.checksums, self.versions)
         object.__setattr__(self, "key", hashlib.sha256(repr(facts).encode()).hexdigest())
+
+    @property
+    def inputs(self) -> dict[str, Path]:
+        """The files that are kept with the results, by their checksums: all but programs."""
+        found, sums = input_files(self.plan), self.checksums
+        return {sums[name]: file for name, file in found.items() if name in sums}
 
     @cached_property
     def packed(self) -> bytes:

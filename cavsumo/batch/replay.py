@@ -14,13 +14,11 @@ from cavsumo.batch.messages import Answer
 from cavsumo.batch.prepared import PreparedBatch, prepare
 from cavsumo.batch.trust import check_trust
 from cavsumo.batch.worker import Worker, search
-from cavsumo.errors import DivergenceError, InputError, ResultsError, shown
+from cavsumo.errors import DivergenceError, ResultsError, shown
 from cavsumo.model.bodies import STEERING, THROTTLE
-from cavsumo.model.checksums import checksum
-from cavsumo.model.named_networks import check_network, network_file, routes_file
-from cavsumo.model.scenario import BatchPlan, Scenario
+from cavsumo.model.scenario import BatchPlan
 from cavsumo.results.columns import COLUMNS, Row
-from cavsumo.results.reading import check_cells, inside, read_rows
+from cavsumo.results.reading import check_cells, inside, rows_of
 from cavsumo.results.recorded_plan import plan_in, recorded_plan
 from cavsumo.results.rows import cell
 from cavsumo.results.traces import NOT_REPLAYED, Trace, parsed, read_trace
@@ -91,7 +89,7 @@ def recorded(csv_file: Path, run: int, allowed: Collection[str] | None = ()) -> 
 
 def recorded_row(csv_file: Path, run: int) -> dict[str, str]:
     """The row of an episode."""
-    rows = {row.get("run"): row for row in read_rows(csv_file)}
+    rows = {row.get("run"): row for row in rows_of(csv_file, filled=False)}
     if str(run) not in rows:
         raise ResultsError(f"results {str(csv_file)!r}: no run {run} among {len(rows)} rows")
     check_cells(csv_file, rows[str(run)])
@@ -121,64 +119,6 @@ def recorded_alone(
             "replay it from its results, or play it back with --playback"
         )
     return Record(plan, row, trace, head, file, alone=True, allowed=allowed)
-
-
-def located(record: Record, net: Path | None, routes: Path | None) -> Record:
-    """The record with the present paths of its files, identified by their checksums.
-
-    Each is searched at the given path, else at its recorded path and beside the trace; a network
-    with a name is found by it. Raises InputError for a missing or different file.
-    """
-    scenario = record.plan.scenario
-    if net is not None:
-        check_network(net, "--net")
-        net = network_file(net)
-    here = {"net": _file(record, "--net", scenario.net, net)}
-    if scenario.routes is not None:
-        here["routes"] = _file(record, "--routes", scenario.routes, routes)
-    more = tuple(_file(record, "additional", file, None) for file in scenario.additional)
-    moved = scenario.model_copy(update={**here, "additional": more})
-    known = dict(record.origin.get("sha256") or {})
-    for was, now in zip(_files(scenario), _files(moved), strict=True):
-        known[str(now)] = known.pop(str(was))
-    return dataclasses.replace(
-        record,
-        plan=record.plan.model_copy(update={"scenario": moved}),
-        origin={**record.origin, "sha256": known},
-    )
-
-
-def _files(scenario: Scenario) -> list[Path]:
-    """The files to find."""
-    return [f for f in (scenario.net, scenario.routes, *scenario.additional) if f is not None]
-
-
-def _file(record: Record, option: str, was: Path, given: Path | None) -> Path:
-    """The present path of a plan's file."""
-    expected = dict(record.origin.get("sha256") or {}).get(str(was))
-    recorded_at = network_file(was) if option == "--net" else routes_file(was)
-    if given is None and recorded_at.is_file() and checksum(recorded_at) == expected:
-        return was
-    places = [given] if given else [recorded_at, record.file.parent / recorded_at.name]
-    there = [file for file in places if file.is_file()]
-    for file in there:
-        if checksum(file) == expected:
-            return file
-    what = f"{recorded_at.name!r} (sha256 {str(expected)[:12]})"
-    if there:
-        raise InputError(
-            f"{option} {str(there[0])!r}: sha256 {checksum(there[0])[:12]}, not the {what} of "
-            f"{str(record.file)!r}"
-        )
-    if given:
-        raise InputError(f"{option}: no such file: {str(given)!r}")
-    how = f"name it with {option} FILE or put it" if option.startswith("--") else "put it"
-    without = ""
-    if option == "--routes" and record.trace is not None and record.trace.has_recording:
-        without = ", or play back who departed with --playback"
-    raise InputError(
-        f"{str(record.file)!r} needs {what}, which is not here; {how} beside it{without}"
-    )
 
 
 # Played again

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
@@ -23,7 +24,8 @@ def write_report_files(results: Sequence[Path], wanted: ReportOptions) -> str:
     text = FORMATS[wanted.format](found)
     xml = junit(found.evidence) if wanted.junit is not None else ""
     if write_page is not None and wanted.html is not None:
-        write_page(found, wanted.html, wanted.replays)
+        for problem in write_page(found, wanted.html, wanted.replays):
+            print(f"cavsumo: --html: {problem}", file=sys.stderr)
     if wanted.junit is not None:
         _write("--junit", wanted.junit, xml)
     if wanted.output is not None:
@@ -32,7 +34,7 @@ def write_report_files(results: Sequence[Path], wanted: ReportOptions) -> str:
     return text
 
 
-def _page_writer() -> Callable[[Report, Path, int], None]:
+def _page_writer() -> Callable[[Report, Path, int], list[str]]:
     """The function that writes the page, when what draws its plots is installed."""
     try:
         from cavsumo.report.pages.report.document import write_report

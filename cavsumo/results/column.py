@@ -46,6 +46,7 @@ class Column:
         unit: of its numbers, empty for none.
         value: the cell of a finished episode; None for an empty one.
         words: its cells are words, not numbers.
+        since: the version of cavsumo that added it; results of versions before are without it.
     """
 
     name: str
@@ -53,6 +54,7 @@ class Column:
     unit: str
     value: Callable[[FinishedEpisode], Any]
     words: bool = False
+    since: str = "0.1"
 
     @property
     def explanation(self) -> str:

@@ -259,18 +259,21 @@ _ALL = (
         "end; empty if a verdict ended the episode before",
         "",
         _driven(lambda ego: None if ego.arrived is None else int(ego.arrived)),
+        since="0.2",
     ),
     Column(
         "driven_m",
         "how far the ego came along its route",
         "m",
         _driven(lambda ego: ego.driven),
+        since="0.2",
     ),
     Column(
         "mean_speed_mps",
         "mean speed of the ego along its route",
         "m/s",
         _driven(lambda ego: ego.driven / ego.time if ego.time > 0.0 else None),
+        since="0.2",
     ),
     Column(
         "lost_s",
@@ -278,14 +281,17 @@ _ALL = (
         "speed limits, without lights (docs/results.md); negative if it was faster",
         "s",
         _driven(lambda ego: ego.lost),
+        since="0.2",
     ),
-    Column("stood_s", "how long the ego stood", "s", _driven(lambda ego: ego.stood)),
+    Column("stood_s", "how long the ego stood", "s", _driven(lambda ego: ego.stood), since="0.2"),
     Column(
         "frozen",
         "stood if the ego had been standing for 10 s or longer when the episode ended, crawled if "
         "it needed, while it moved, more than four times as long as the free drive; else empty",
         "",
         _driven(lambda ego: ego.frozen),
+        words=True,
+        since="0.2",
     ),
     Column(
         "avoidable",

@@ -27,9 +27,9 @@ def checksums(scenario: Scenario, agent_files: Iterable[Path]) -> dict[str, str]
     found = {str(scenario.net): scenario.net_file}
     if scenario.routes is not None and scenario.routes_file is not None:
         found[str(scenario.routes)] = scenario.routes_file
-    files = [*scenario.additional, *agent_files, *ego_files(scenario.ego)]
-    files += assertion_files(scenario.assertions)
-    found |= {str(file): file for file in files}
+    found |= {str(file): scenario.present(file) for file in (*scenario.additional, *agent_files)}
+    programs = (*ego_files(scenario.ego), *assertion_files(scenario.assertions))
+    found |= {str(file): file for file in programs}
     return {name: checksum(file) for name, file in found.items()}
 
 

@@ -20,6 +20,7 @@ FORMAT = "cavsumo-results-1"
 STARTING = "starting"  # the rows beside a manifest with this status belong to an earlier batch
 COMPLETE = ("finished", "stopped", STARTING)  # the statuses of complete batches
 HEADER = ",".join(COLUMNS) + "\n"
+FIRST = frozenset(name for name, column in COLUMNS.items() if column.since == "0.1")
 
 
 def trace_name(csv_file: Path, run: int) -> str:
@@ -96,15 +97,20 @@ def read_rows(csv_file: Path) -> list[dict[str, str]]:
     return list(rows_of(csv_file))
 
 
-def rows_of(csv_file: Path) -> Iterator[dict[str, str]]:
-    """The rows of a results file one by one, as text; the columns must be ours."""
+def rows_of(csv_file: Path, *, filled: bool = True) -> Iterator[dict[str, str]]:
+    """The rows of a results file one by one, as text; the columns must be ours.
+
+    ``filled``: cells of columns that were added since the file was written are empty, not missing.
+    """
     try:
         with csv_file.open(encoding="utf-8", newline="") as stream:
             reader = csv.DictReader(stream, restval="")
             missing = [column for column in COLUMNS if column not in (reader.fieldnames or ())]
-            if missing:
-                raise ResultsError(f"results {str(csv_file)!r}: no column {missing[0]!r}")
-            yield from reader
+            for column in missing:
+                if column in FIRST:
+                    raise ResultsError(f"results {str(csv_file)!r}: no column {column!r}")
+            added = dict.fromkeys(missing, "") if filled else {}
+            yield from (row | added for row in reader)
     except OSError as error:
         raise ResultsError(
             f"results {str(csv_file)!r}: cannot be read: {error.strerror}"
@@ -119,7 +125,9 @@ def whole_lines(csv_file: Path) -> Iterator[tuple[bytes, dict[str, str] | None]]
     """The complete lines of a results file with their rows, None for the header.
 
     A torn last line is left out; any other damage raises ResultsError with the line's number.
+    Cells of columns that were added since the file was written are empty.
     """
+    columns: list[str] = []
     name = f"results {str(csv_file)!r}"
     try:
         stream = csv_file.open("rb")
@@ -130,22 +138,23 @@ def whole_lines(csv_file: Path) -> Iterator[tuple[bytes, dict[str, str] | None]]
             if not line.endswith(b"\n"):
                 return
             if number > 1:
-                yield line, _parsed(line, f"{name}: line {number}")
-            elif line == HEADER.encode("utf-8"):
-                yield line, None
-            else:
+                yield line, _parsed(line, columns, f"{name}: line {number}")
+                continue
+            columns = line.decode("utf-8", errors="replace").removesuffix("\n").split(",")
+            if columns != [column for column in COLUMNS if column in FIRST.union(columns)]:
                 raise ResultsError(f"{name}: line 1 does not hold the columns of cavsumo")
+            yield line, None
 
 
-def _parsed(line: bytes, place: str) -> dict[str, str]:
+def _parsed(line: bytes, columns: Sequence[str], place: str) -> dict[str, str]:
     """A line as a row."""
     try:
         cells = next(csv.reader([line.decode("utf-8")]))
     except (UnicodeDecodeError, csv.Error, StopIteration) as error:
         raise ResultsError(f"{place} is damaged") from error
-    if len(cells) != len(COLUMNS):
-        raise ResultsError(f"{place} has {len(cells)} cells, expected {len(COLUMNS)}")
-    row = dict(zip(COLUMNS, cells, strict=True))
+    if len(cells) != len(columns):
+        raise ResultsError(f"{place} has {len(cells)} cells, expected {len(columns)}")
+    row = dict.fromkeys(COLUMNS, "") | dict(zip(columns, cells, strict=True))
     if not re.fullmatch(r"[0-9]{1,9}", row["run"]):
         raise ResultsError(f"{place} begins with {shown(row['run'])}, expected the number of a run")
     return row

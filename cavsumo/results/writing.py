@@ -23,6 +23,8 @@ from typing import Any
 
 from cavsumo.errors import BatchError, ResultsError
 from cavsumo.results.columns import COLUMNS, Row
+from cavsumo.results.inputs import FOLDER as INPUTS
+from cavsumo.results.inputs import keep, remove_others
 from cavsumo.results.reading import (
     FORMAT,
     HEADER,
@@ -87,6 +89,15 @@ class Recorder:
             raise ResultsError(
                 f"results {str(self.csv_file)!r}: cannot be written: {error.strerror}"
             ) from error
+
+    def keep(self, files: Mapping[str, Path]) -> list[Path]:
+        """Keep the inputs of the batch, by their checksums; returns those that are too large."""
+        folder = self.trace_folder / INPUTS
+        try:
+            remove_others(folder, set(files))
+            return [file for sha, file in files.items() if not keep(folder, file, sha)]
+        except OSError as error:
+            raise self._no_more(error) from error
 
     def resume(self, manifest: Mapping[str, Any], todo: Iterator[int]) -> Iterator[dict[str, str]]:
         """Continue after the existing rows, and yield them; call until exhausted.
@@ -197,6 +208,11 @@ class Recorder:
     def _whole_rows(self, todo: Iterator[int]) -> Iterator[dict[str, str]]:
         """The existing rows, which must be the first ones of the batch."""
         for line, row in whole_lines(self.csv_file):
+            if row is None and line != HEADER.encode("utf-8"):
+                raise ResultsError(
+                    f"results {str(self.csv_file)!r}: were written by an earlier version, with "
+                    "fewer columns; this version reads them and does not go on with them"
+                )
             if row is not None:
                 expected = next(todo, None)
                 if row["run"] != str(expected):

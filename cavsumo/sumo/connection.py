@@ -93,12 +93,12 @@ class Simulations:
     @cached_property
     def types_told(self) -> dict[str, Attributes] | None:
         """The vehicle types of the demand; None when departures would not tell all of it."""
-        return types_told(self.routes, self._scenario.additional)
+        return types_told(self.routes, self._scenario.additional_files)
 
     def command(self, seed: int, routes: Path | None) -> list[str]:
         """The command line of SUMO; without routes the types of a demand that is sent by us."""
         scenario = self._scenario
-        more = [*scenario.additional, self._types]
+        more = [*scenario.additional_files, self._types]
         if routes is None and self._kept.exists():
             more.append(self._kept)
         files = ["-n", str(self._net), "-a", ",".join(str(f) for f in more)]

@@ -10,7 +10,8 @@ from pathlib import Path
 import pytest
 from support import ROOT, content
 
-from cavsumo.batch.replay import located, recorded_alone
+from cavsumo.batch.located import located
+from cavsumo.batch.replay import recorded_alone
 from cavsumo.cli import main
 from cavsumo.errors import InputError, UnknownName
 from cavsumo.model import named_networks
@@ -31,7 +32,7 @@ def without_place(folder: Path, *places: str) -> dict[str, str]:
     """The results and traces in a folder, with all that a plan says of places taken out."""
     found = {}
     for name, data in content(folder).items():
-        if name == "results.json":
+        if name == "results.json" or "/inputs/" in name:
             continue
         text = data.decode()
         for place in sorted(places, key=len, reverse=True):
@@ -78,7 +79,7 @@ def test_a_recorded_name_is_found_again_anywhere(
 def test_another_network_of_the_same_name_is_refused_in_a_replay(
     away: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """By its checksum; the one recorded may lie beside the trace."""
+    """By its checksum; the one recorded may be kept with the trace, or lie beside it."""
     words = [*FEW, "--runs", "1"]
     assert main(["run", "--net", "pedestrians", *words, "-o", "results.csv"]) == 0
     trace = next((away / "results").glob("*.jsonl"))
@@ -88,11 +89,13 @@ def test_another_network_of_the_same_name_is_refused_in_a_replay(
     net = changed / "networks" / "pedestrians.net.xml"
     net.write_text(net.read_text() + "<!-- changed -->\n")
     monkeypatch.setattr(named_networks, "_folder", lambda sort: changed / sort)
+    assert located(recorded_alone(trace)).plan.scenario.net_file.name == "pedestrians.net.xml"
+    shutil.rmtree(trace.parent / "inputs")
     with pytest.raises(InputError, match=r"not the 'pedestrians\.net\.xml' \(sha256"):
         located(recorded_alone(trace), None, None)
     shutil.copy(ROOT / "networks" / "pedestrians.net.xml", trace.parent)
     found = located(recorded_alone(trace), None, None).plan.scenario
-    assert found.net == trace.parent / "pedestrians.net.xml"
+    assert found.net_file == trace.parent / "pedestrians.net.xml"
 
 
 def test_a_file_goes_before_a_name_and_a_folder_does_not(

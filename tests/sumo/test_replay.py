@@ -14,13 +14,13 @@ from typing import Any
 import pytest
 
 from cavsumo.batch.executors import Means
+from cavsumo.batch.located import located
 from cavsumo.batch.preflight import Manner
 from cavsumo.batch.prepared import prepare
 from cavsumo.batch.replay import (
     Record,
     Replayed,
     compare,
-    located,
     recorded,
     recorded_alone,
     replayed,
@@ -210,20 +210,23 @@ def test_the_command_names_a_change_on_disk(
     assert said.count("\n") == 1
 
 
-def test_another_network_than_recorded_is_pointed_out(
+def test_another_version_is_pointed_out_and_another_network_refused(
     recording: Recording, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """The manifest knows the network's hash: a replay on a changed file says that it changed."""
+    """The manifest knows versions and checksums: only the recorded network is played on."""
     file = _copied(recording.csv_file, tmp_path)
     manifest = json.loads(file.with_suffix(".json").read_text(encoding="utf-8"))
     net = next(name for name in manifest["sha256"] if name.endswith(".net.xml"))
-    manifest["sha256"][net] = "0" * 64
     manifest["versions"]["libsumo"] = "1.0.0"
     file.with_suffix(".json").write_text(json.dumps(manifest), encoding="utf-8")
     assert replay(file, ReplayOptions(RUN)) == Exit.OK
-    said = capsys.readouterr().err
-    assert f"{net} was {'0' * 64}" in said
-    assert "libsumo was 1.0.0" in said
+    assert "libsumo was 1.0.0" in capsys.readouterr().err
+    manifest["sha256"][net] = "0" * 64
+    file.with_suffix(".json").write_text(json.dumps(manifest), encoding="utf-8")
+    with pytest.raises(
+        InputError, match=r"sha256 a72e56a374a8, not the 'crossing.net.xml' \(sha25"
+    ):
+        replay(file, ReplayOptions(RUN))
 
 
 def test_a_learners_episode_can_be_replayed(networks: dict[str, Path], tmp_path: Path) -> None:
@@ -426,8 +429,8 @@ def test_the_files_of_a_trace_can_be_named(
     for name in ("crossing.net.xml", "crossing.rou.xml"):
         (tmp_path / name).unlink()
     found = located(recorded_alone(file), networks["crossing"], routes["crossing"])
-    assert found.plan.scenario.net == networks["crossing"]
-    assert found.plan.scenario.routes == routes["crossing"]
+    assert found.plan.scenario.net_file == networks["crossing"]
+    assert found.plan.scenario.routes_file == routes["crossing"]
 
 
 @pytest.mark.parametrize(
@@ -502,6 +505,6 @@ def _copied(csv_file: Path, folder: Path) -> Path:
     traces.mkdir()
     for source in (csv_file, csv_file.with_suffix(".json")):
         (folder / source.name).write_bytes(source.read_bytes())
-    for source in csv_file.with_suffix("").iterdir():
+    for source in csv_file.with_suffix("").glob("run*"):
         (traces / source.name).write_bytes(source.read_bytes())
     return folder / csv_file.name

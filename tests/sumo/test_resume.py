@@ -471,5 +471,5 @@ def test_the_command_line_plays_errors_again(
     assert main(["run", "--retry-errors"]) in (0, 1)
     printed = capsys.readouterr().out
     assert "could not be run" not in printed
-    assert f"({len(list(file.with_suffix('').iterdir()))} traces)" in printed
+    assert f"({len(list(file.with_suffix('').glob('*.jsonl')))} traces)" in printed
     assert_same(file, drill.quiet)

@@ -5,6 +5,7 @@ SUMO uses a seed modulo 2^31, so seeds that are equal modulo 2^31 count as equal
 
 from __future__ import annotations
 
+import contextlib
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -16,6 +17,7 @@ from cavsumo.errors import InputError, ResultsError
 from cavsumo.model.documents import json_of, read_text
 from cavsumo.model.scenario import BatchPlan
 from cavsumo.model.seeds import episode_seed
+from cavsumo.results.present import present_paths
 from cavsumo.results.reading import FORMAT, rows_of
 from cavsumo.results.recorded_plan import recorded_plan
 
@@ -45,6 +47,7 @@ def used(results: Sequence[Path], params: Mapping[str, Any]) -> Used:
     so are those in the plans of all these results.
     """
     seeds: set[int] = set()
+    named: dict[Path, Path] = {}  # files that are kept with results, by where they are now
     known, silent = _files_in(params)
     todo, done = [*results, *known], dict.fromkeys(silent, False)
     while todo:
@@ -54,15 +57,31 @@ def used(results: Sequence[Path], params: Mapping[str, Any]) -> Used:
         plan, manifest = recorded_plan(csv_file)
         seeds |= _seeds_of(csv_file, plan)
         done[csv_file] = True
-        known, silent = _files_in(plan.params)
+        kept = _kept(plan, manifest, csv_file)
+        named |= {
+            place.with_suffix(end): Path(name).with_suffix(end)
+            for name, place in kept.items()
+            if Path(name).name
+            for end in (".csv", place.suffix)
+        }
+        known, silent = _files_in({**plan.params, **{k: str(v) for k, v in kept.items()}})
         origin = dict(manifest.get("certifies") or {}).get("results", "none")
         todo += known + [f for f in (Path(origin),) if f.with_suffix(".json").is_file()]
         done |= dict.fromkeys(silent, False)
     return Used(
         frozenset(seeds),
-        tuple(file for file, recorded in done.items() if recorded),
-        tuple(file for file, recorded in done.items() if not recorded),
+        tuple(named.get(file, file) for file, recorded in done.items() if recorded),
+        tuple(named.get(file, file) for file, recorded in done.items() if not recorded),
     )
+
+
+def _kept(plan: BatchPlan, manifest: Mapping[str, Any], csv_file: Path) -> dict[str, Path]:
+    """The present paths of the files that parameters name and that are not where they were."""
+    found: dict[str, Path] = {}
+    for name in {value for value in plan.params.values() if isinstance(value, str)}:
+        with contextlib.suppress(InputError):  # it is nowhere: then nothing learned from it either
+            found |= present_paths(plan, manifest, csv_file, [str(Path(name))])
+    return found
 
 
 def _seeds_of(csv_file: Path, plan: BatchPlan) -> set[int]:

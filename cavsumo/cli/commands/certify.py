@@ -24,6 +24,7 @@ from cavsumo.batch.certify.certificate import (
 from cavsumo.batch.certify.ego_list import Egos, choices, opponents
 from cavsumo.batch.certify.tested_policy import Subject, of_policy, of_run, settings_of
 from cavsumo.batch.certify.used_seeds import Used, fresh_seed, used
+from cavsumo.batch.located import located
 from cavsumo.batch.manner import Manner, Means
 from cavsumo.batch.playing import played
 from cavsumo.batch.preflight import CheckedBatch, checked
@@ -40,6 +41,7 @@ from cavsumo.model.scenario import BatchPlan
 from cavsumo.model.seeds import starts_generator
 from cavsumo.model.study import Part, product
 from cavsumo.network.recorded_starts import recorded_start
+from cavsumo.results.present import present_paths
 from cavsumo.results.recorded_plan import recorded_plan
 
 FORMAT = 1  # of the JSON; raised when a key changes its meaning or goes
@@ -53,6 +55,7 @@ def certify(order: CertifyOptions) -> int:
     egos = opponents(order.egos, order.ego_param, plan.scenario)
     check_trust(plan.scenario, order.results, _allowed(order), ego=not order.egos)
     seeds = used([order.results, *order.apart], order.param)
+    places = present_paths(plan, manifest, order.results)
     subject, record = _subject(order, plan, manifest)
     seed = fresh_seed(order.seed, order.runs, seeds.seeds)
     parts = _parts(order, manifest, subject, egos, seed)
@@ -63,7 +66,7 @@ def certify(order: CertifyOptions) -> int:
         exit_zero=order.exit_zero,
     )
     with _output(order) as output:
-        batches = [_marked(b, order, subject) for b in checked(parts, output, manner)]
+        batches = [_marked(b, order, subject) for b in checked(parts, output, manner, places)]
         _check_batches(order, batches, subject, record)
         _warn(manifest, batches[0].prepared, record, seeds, subject)
         if not order.quiet:
@@ -127,7 +130,7 @@ def _subject(
     """The test, and its run if it has one."""
     if not order.test.isdecimal():
         return of_policy(order.test, plan, manifest, order.results, order.param), None
-    record = recorded(order.results, int(order.test), _allowed(order))
+    record = located(recorded(order.results, int(order.test), _allowed(order)))
     kept = order.starts != "fresh"
     return of_run(record, order.param, kept=kept, open_loop=order.open_loop), record
 

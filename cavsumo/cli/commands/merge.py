@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -12,7 +13,12 @@ from cavsumo.errors import Exit
 
 def merge(parts: Sequence[Path], output: Path, overwrite: bool, quiet: bool) -> int:
     """Merge the parts and print their summary."""
-    whole = merged(parts, output, overwrite=overwrite)
+    whole = merged(parts, output, overwrite=overwrite, warn=_warn)
     if not quiet:
         summarise([whole])
     return Exit.OK
+
+
+def _warn(said: str) -> None:
+    """A line about the results on stderr."""
+    print(f"cavsumo: {said}", file=sys.stderr)

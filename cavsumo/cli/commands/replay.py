@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
-import dataclasses
 import sys
 from pathlib import Path
 
+from cavsumo.batch.located import located
 from cavsumo.batch.playback import NOT_PLAYED_BACK, for_playback, played_back
 from cavsumo.batch.prepared import PreparedBatch, manifest
 from cavsumo.batch.replay import (
     Record,
     compare,
-    located,
     prepared_again,
     recorded,
     recorded_alone,
@@ -36,19 +35,20 @@ def replay(file: Path, wanted: ReplayOptions) -> int:
     if wanted.playback and wanted.recorded:
         raise InputError("replay: --recorded plays nothing and --playback plays; name one of them")
     found = _found(file, wanted)
-    record = _located(for_playback(found) if wanted.playback else found, file, wanted)
+    record = for_playback(found) if wanted.playback else found
+    if not wanted.recorded or wanted.shown:
+        record = located(record, wanted.net, wanted.routes, shown=wanted.recorded)
     if wanted.recorded:
         trace: Trace | None = _recorded_trace(record)
         site = shown_site(record.plan, trace) if wanted.shown else None
     elif wanted.playback:
         trace, site = record.trace, _played_back(record)
-        record = _as_it_was(record, found)
     else:
         trace, site = _played(record)
     if wanted.shown and trace is None:
         raise InputError(f"replay: run {record.run} ended in an error, there is nothing to show")
     if trace is not None and site is not None:
-        _show(site, record, trace, wanted)
+        _show(site, found, trace, wanted)
     return Exit.OK
 
 
@@ -59,13 +59,6 @@ def _found(file: Path, wanted: ReplayOptions) -> Record:
         return recorded_alone(file, allowed, anew=not wanted.playback)
     assert wanted.run is not None
     return recorded(file, wanted.run, allowed)
-
-
-def _located(record: Record, file: Path, wanted: ReplayOptions) -> Record:
-    """An episode with its files where they are here; those of results are where they were."""
-    if file.suffix == TRACE or wanted.net or wanted.routes:
-        return located(record, wanted.net, wanted.routes)
-    return record
 
 
 def _recorded_trace(record: Record) -> Trace:
@@ -110,14 +103,6 @@ def _say(record: Record, how: str) -> None:
     compared = f"{len(frames)} frames" if frames is not None else "its row (no trace was kept)"
     row = record.row
     print(f"run {record.run} ({row['agent']}): {row['outcome']}, {compared}: {how}")
-
-
-def _as_it_was(record: Record, found: Record) -> Record:
-    """An episode that was played back with the plan that was recorded, its files where they are."""
-    here = {key: getattr(record.plan.scenario, key) for key in ("net", "additional")}
-    scenario = found.plan.scenario.model_copy(update=here)
-    plan = found.plan.model_copy(update={"scenario": scenario})
-    return dataclasses.replace(found, plan=plan)
 
 
 def _show(site: Site, record: Record, trace: Trace, wanted: ReplayOptions) -> None:

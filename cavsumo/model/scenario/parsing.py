@@ -22,8 +22,12 @@ PLAN_KEYS = frozenset(BatchPlan.model_fields) - {"scenario"}
 SENSOR_KEYS = ("ego_sensor", "tester_sensor")
 
 
-def plan_from(settings: Mapping[str, Any], source: str) -> BatchPlan:
+def plan_from(
+    settings: Mapping[str, Any], source: str, places: Mapping[str, Path] | None = None
+) -> BatchPlan:
     """Validate flat settings (from a file, the command line or both) into a plan.
+
+    ``places``: the present paths of files that results name (``Scenario.placed``).
 
     A route file that lies beside the network (``routes/NAME.rou.xml`` next to its folder) is
     found when none is named and no traffic is to be drawn; ``routes = "none"`` keeps the roads
@@ -36,14 +40,16 @@ def plan_from(settings: Mapping[str, Any], source: str) -> BatchPlan:
         if not isinstance(settings.get(key, ""), str | Path):
             raise InputError(f"{source}: {key}: expected a path, got {shown(settings[key])}")
     settings = with_configuration(settings, source)
-    check_network(Path(settings["net"]), source)
+    places = places or {}
+    if str(settings["net"]) not in places:
+        check_network(Path(settings["net"]), source)
     scenario = {k: v for k, v in settings.items() if k in SCENARIO_KEYS}
     if str(scenario.get("traffic")) == "none":
         del scenario["traffic"]
     scenario["routes"] = _route_file(scenario, source)
     try:
         plan = BatchPlan(
-            scenario=Scenario(**scenario),
+            scenario=Scenario(**scenario).placed(places),
             **{k: v for k, v in settings.items() if k in PLAN_KEYS},
         )
     except ValidationError as error:
@@ -54,7 +60,7 @@ def plan_from(settings: Mapping[str, Any], source: str) -> BatchPlan:
 
 def _check_together(plan: BatchPlan, source: str) -> None:
     """Refuse files that are not there, and settings that do not go together."""
-    for file in (plan.scenario.routes_file, *plan.scenario.additional):
+    for file in (plan.scenario.routes_file, *plan.scenario.additional_files):
         if file is not None and not file.is_file():
             raise InputError(f"{source}: no such file: {str(file)!r}")
     if plan.shard and (plan.first or plan.until_tests or plan.until_half_width):

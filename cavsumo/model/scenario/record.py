@@ -11,7 +11,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, field_validator, model_validator
+from pydantic import BaseModel, ConfigDict, Field, PrivateAttr, field_validator, model_validator
 
 from cavsumo.model.checks import densities
 from cavsumo.model.named_networks import DEFAULT, network_file, routes_file
@@ -22,9 +22,14 @@ from cavsumo.model.vocabulary import ApproachType, Signal
 
 
 class Scenario(BaseModel):
-    """One test scenario; every field has its unit in its description."""
+    """One test scenario; every field has its unit in its description.
+
+    Its files are named as they were given, wherever they are now (``placed``): manifests and traces
+    do not depend on that.
+    """
 
     model_config = ConfigDict(extra="forbid", frozen=True, defer_build=True)
+    _places: Mapping[str, Path] = PrivateAttr(default_factory=dict)
 
     net: Annotated[
         Path,
@@ -191,12 +196,29 @@ class Scenario(BaseModel):
         """The network's name without its endings."""
         return self.net.name.removesuffix(".gz").removesuffix(".xml").removesuffix(".net")
 
+    def placed(self, places: Mapping[str, Path]) -> Scenario:
+        """The same scenario with the present paths of some of its files, by their names."""
+        again = self.model_copy()
+        again._places = {**self._places, **places}
+        return again
+
+    def present(self, file: Path) -> Path:
+        """The present path of a file that the scenario or an agent names."""
+        return self._places.get(str(file), file)
+
     @property
     def net_file(self) -> Path:
         """The network's file, on this machine."""
-        return network_file(self.net)
+        return self._places.get(str(self.net)) or network_file(self.net)
 
     @property
     def routes_file(self) -> Path | None:
         """The file of the background demand, on this machine."""
-        return None if self.routes is None else routes_file(self.routes)
+        if self.routes is None:
+            return None
+        return self._places.get(str(self.routes)) or routes_file(self.routes)
+
+    @property
+    def additional_files(self) -> tuple[Path, ...]:
+        """SUMO's additional files, on this machine."""
+        return tuple(map(self.present, self.additional))

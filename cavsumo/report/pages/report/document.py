@@ -15,7 +15,13 @@ from cavsumo.report.analysis import Report
 from cavsumo.report.cells import TOPICS, Table, number
 from cavsumo.report.compare import WORDS, PairedComparison
 from cavsumo.report.pages.report import words
-from cavsumo.report.pages.report.links import LinkedRun, chosen, with_pages, write_pages
+from cavsumo.report.pages.report.links import (
+    LinkedRun,
+    chosen,
+    unshown,
+    with_pages,
+    write_pages,
+)
 from cavsumo.report.pages.report.places import MEANING, Map, maps
 from cavsumo.report.pages.report.plots import (
     DASHES,
@@ -56,8 +62,10 @@ class Plot(NamedTuple):
     note: str = ""
 
 
-def write_report(report: Report, file: Path, replays: int) -> None:
+def write_report(report: Report, file: Path, replays: int) -> list[str]:
     """Write the page, and beside it those of some replays; raises InputError.
+
+    Returns sentences that say which pages cannot be made, and why; the page has them too.
 
     Args:
         replays: how many failures are shown as pages of their own; of the tests that the ego
@@ -68,9 +76,13 @@ def write_report(report: Report, file: Path, replays: int) -> None:
     failures = with_pages(failures, replays, report, played)
     tests = with_pages(tests, replays // 2, report, played)
     folder = file.parent / f"{file.stem}_replays"
-    text = page(report, played, failures, tests, folder.name)
+    problems = unshown(failures, replays, report, played)
+    problems += unshown(tests, replays // 2, report, played)
+    problems = list(dict.fromkeys(problems))
+    text = page(report, played, failures, tests, folder.name, problems)
     write_pages([*failures, *tests], report.evidence.batches, played, folder)
     write(text, file)
+    return problems
 
 
 def page(
@@ -79,8 +91,9 @@ def page(
     failures: Sequence[LinkedRun],
     tests: Sequence[LinkedRun],
     folder: str,
+    problems: Sequence[str],
 ) -> str:
-    """The page, with links into a folder of replays."""
+    """The page, with links into a folder of replays, and with what is not in it."""
     found: dict[str, list[Table]] = {topic: [] for topic in TOPICS}
     for table in tables(report):
         found[table.topic].append(table)
@@ -105,7 +118,7 @@ def page(
         failures=failures,
         tests=tests,
         totals={what: sum(getattr(one, what).count for one in report.rates) for what in COUNTED},
-        problems=list(dict.fromkeys(scene.problem for scene in played if scene.problem)),
+        problems=problems,
         several=any(group.setting for group in report.groups),
         beside=quote(folder),
     )

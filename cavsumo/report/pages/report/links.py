@@ -120,6 +120,21 @@ def with_pages(
     ]
 
 
+def unshown(
+    looks: Sequence[LinkedRun], most: int, report: Report, scenes: Sequence[BatchPlace]
+) -> list[str]:
+    """Sentences that say why listed runs have no pages although there is room for more."""
+    if most == 0 or sum(1 for look in looks if look.page) >= min(most, len(looks)):
+        return []
+    traced, listed = report.evidence.rows["trace"], {look.batch for look in looks}
+    bare = [scene for scene in scenes if scene.site is None and listed & set(scene.batches)]
+    said = [f"No replay pages, for lack of the network: {scene.problem}" for scene in bare]
+    missing = sum(1 for look in looks[:most] if not traced[look.index])
+    if missing:
+        said.append(f"No replay pages of {missing} of the listed runs: no trace of them was kept")
+    return said
+
+
 def _name(look: LinkedRun, several: bool) -> str:
     """The name of the page of a run."""
     return f"{f'batch{look.batch + 1}-' if several else ''}run{look.run:06d}.html"

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
-from cavsumo.batch.replay import Record, located
+from cavsumo.batch.located import located
+from cavsumo.batch.replay import Record
 from cavsumo.batch.shown import is_ours, shown_site
 from cavsumo.errors import CavsumoError
 from cavsumo.model.scenario import BatchPlan
@@ -42,6 +43,8 @@ def scenes(batches: Sequence[Batch]) -> list[BatchPlace]:
         key = repr((batch.plan.scenario, checksums))
         if key not in found:
             found[key] = _scene(batch)
+        elif found[key].site is None:  # its files may lie beside these results
+            found[key] = replace(_scene(batch), batches=found[key].batches)
         found[key].batches.append(i)
     return list(found.values())
 
@@ -51,7 +54,7 @@ def _scene(batch: Batch) -> BatchPlace:
     name = batch.plan.scenario.name
     try:
         record = Record(batch.plan, {}, None, batch.manifest, batch.csv_file)
-        plan = located(record, None, None).plan
+        plan = located(record, shown=True).plan
         return BatchPlace(name, plan, shown_site(plan, _some_trace(batch)), "")
     except CavsumoError as error:
         return BatchPlace(name, None, None, str(error))

@@ -1,0 +1,254 @@
+"""Results that are moved: played, reported, certified, merged and continued anywhere.
+
+The network and the routes are deleted where they were, and the working folder is an empty one.
+"""
+
+from __future__ import annotations
+
+import csv
+import json
+import re
+import shutil
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+from support import content, rows, traces
+
+import cavsumo
+from cavsumo.batch.certify.used_seeds import used
+from cavsumo.cli import main
+from cavsumo.results.reading import FIRST, read_manifest
+
+RUN = 1  # which the ego fails
+PLAYED = ("run", "--net", "networks/crossing.net.xml", "--runs", "2", "--trace", "all")
+QUIET = ("-q", "--exit-zero")
+# The header of version 0.1.
+OLD = (
+    "run,agent,ego,testers,reset,embodiment,sumo_width_m,seed,forecast,forecast_value,outcome,"
+    "breach,blame,assertion,verdicts,robustness,tester,trigger_time_s,violation_time_s,time_s,"
+    "steps,min_gap_m,min_ttc_s,max_drac_mps2,pet_s,ego_speed_mps,impact_speed_mps,max_decel_mps2,"
+    "avoidable,reference,last_chance_s,margin_s,avoidable_note,cost,accel_rms_mps2,turning_rad,"
+    "reward,contacts,tester_contacts,sumo_collisions,background_collisions,emergency_stops,"
+    "teleports,trace,error,wall_s"
+).split(",")
+
+
+@pytest.fixture(scope="module")
+def moved(
+    networks: dict[str, Path],
+    routes: dict[str, Path],
+    tmp_path_factory: pytest.TempPathFactory,
+    inline: None,
+) -> Path:
+    """The folder of a batch, its two shards and the page of a run, moved after it was played."""
+    home, away = tmp_path_factory.mktemp("home"), tmp_path_factory.mktemp("away") / "batch"
+    for folder, files in (("networks", networks), ("routes", routes)):
+        (home / folder).mkdir()
+        shutil.copy(files["crossing"], home / folder)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.chdir(home)
+        Path("batch").mkdir()
+        assert main([*PLAYED, "-o", "batch/results.csv", *QUIET]) == 0
+        for i in ("1", "2"):
+            words = ["--shard", f"{i}/2", "-o", f"batch/part{i}.csv"]
+            assert main([*PLAYED, *words, *QUIET]) == 0
+        assert main(["replay", "batch/results.csv", str(RUN), "--html", "batch/before.html"]) == 0
+    shutil.move(home / "batch", away)
+    shutil.rmtree(home)
+    return away
+
+
+@pytest.fixture
+def elsewhere(tmp_path: Path, moved: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
+    """An empty working folder beside the moved results, which stay as they are."""
+    before = content(moved)
+    monkeypatch.chdir(tmp_path)
+    yield tmp_path
+    assert content(moved) == before
+
+
+@pytest.mark.parametrize("words", [(), ("--playback",), ("--recorded",)])
+def test_a_row_is_played_again(
+    moved: Path, elsewhere: Path, capsys: pytest.CaptureFixture[str], words: tuple[str, ...]
+) -> None:
+    """Bit for bit, anew and back; its page is that from before the move, byte for byte."""
+    html = elsewhere / "page.html"
+    assert main(["replay", str(moved / "results.csv"), "1", "--html", str(html), *words]) == 0
+    said = capsys.readouterr()
+    assert (said.out.startswith("run 1 (timing): violated, "), said.err) == (True, "")
+    assert html.read_bytes() == (moved / "before.html").read_bytes()
+
+
+def test_a_trace_is_played_with_the_inputs_beside_it(
+    moved: Path, elsewhere: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """The folder of traces alone, sent to somebody."""
+    shutil.copytree(moved / "results", elsewhere / "sent")
+    assert main(["replay", "sent/run000001.jsonl"]) == 0
+    assert capsys.readouterr().out.endswith(" frames: the same\n")
+
+
+def test_python_plays_them_too(moved: Path, elsewhere: Path) -> None:
+    """``cavsumo.load`` from any working folder."""
+    results = cavsumo.load(moved / "results.csv")
+    assert results.replay(RUN).row["outcome"] == "violated"
+    assert len(results.replay(RUN, recorded=True).frames) > 0
+
+
+def test_a_report_has_its_pages(
+    moved: Path, elsewhere: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """The map and the page of the failure."""
+    assert main(["report", str(moved / "results.csv"), "--html", "report.html", "-o", "t.txt"]) == 0
+    assert capsys.readouterr().err == ""
+    assert (elsewhere / "report_replays" / "run000001.html").is_file()
+    assert "drawn without its network" not in (elsewhere / "report.html").read_text("utf-8")
+
+
+def test_a_report_says_which_pages_it_cannot_make(
+    moved: Path, elsewhere: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Without its inputs: on stderr and in the page."""
+    file = _copied(moved, elsewhere)
+    shutil.rmtree(elsewhere / "results" / "inputs")
+    assert main(["report", str(file), "--html", "report.html", "-o", "t.txt"]) == 0
+    said = capsys.readouterr().err
+    words = "No replay pages, for lack of the network: "
+    assert said.startswith(f"cavsumo: --html: {words}")
+    assert (said.count("\n"), "needs 'crossing.net.xml' (sha256 a72e56a374a8)" in said) == (1, True)
+    assert words in (elsewhere / "report.html").read_text("utf-8")
+    shutil.rmtree(elsewhere / "results")
+    (elsewhere / "results").mkdir()
+    shutil.copytree(moved / "results" / "inputs", elsewhere / "results" / "inputs")
+    text = file.read_text("utf-8")
+    file.write_text(re.sub(r"results/run\d+\.jsonl", "", text), "utf-8")
+    assert main(["report", str(file), "--html", "report.html", "-o", "t.txt"]) == 0
+    assert "pages of 1 of the listed runs: no trace of them was kept" in capsys.readouterr().err
+
+
+def test_a_test_is_certified(moved: Path, elsewhere: Path) -> None:
+    """Run by run and by its agent; what it writes has the inputs too."""
+    words = ["certify", str(moved / "results.csv"), str(RUN), "--runs", "2", "-o", "c.csv"]
+    assert main([*words, *QUIET]) == 0
+    assert _inputs(elsewhere / "c-sumo.csv") == _inputs(moved / "results.csv")
+    scenario = read_manifest(elsewhere / "c-sumo.csv")["plan"]["scenario"]
+    assert scenario["net"] == "networks/crossing.net.xml"
+
+
+def test_shards_are_merged_with_their_inputs(
+    moved: Path, elsewhere: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """The rows, traces and inputs of the one run; without inputs a sentence each."""
+    parts = [str(moved / f"part{i}.csv") for i in (1, 2)]
+    assert main(["merge", *parts, "-o", "whole.csv", "-q"]) == 0
+    assert capsys.readouterr().err == ""
+    whole, single = elsewhere / "whole.csv", moved / "results.csv"
+    untold = [{**row, "trace": ""} for row in rows(whole)]
+    assert untold == [{**row, "trace": ""} for row in rows(single)]
+    assert traces(whole) == traces(single)
+    assert _inputs(whole) == _inputs(single)
+    for i in (1, 2):
+        _copied(moved, elsewhere, f"part{i}")
+        shutil.rmtree(elsewhere / f"part{i}" / "inputs")
+    assert main(["merge", "part1.csv", "part2.csv", "-o", "bare.csv", "-q"]) == 0
+    said = capsys.readouterr().err
+    assert said.count("which is not here; ") == said.count("; the whole is without it\n") == 2
+
+
+def test_a_batch_is_continued(moved: Path, elsewhere: Path, tmp_path: Path) -> None:
+    """Two rows stay as they are; the plan and the new trace name files as they were named."""
+    file = _copied(moved, elsewhere)
+    before = file.read_bytes(), traces(file)
+    assert main(["run", "--resume", "-o", str(file), "--runs", "3", *QUIET]) == 0
+    assert file.read_bytes().startswith(before[0])
+    after = traces(file)
+    assert len(after) == 3
+    assert after.items() >= before[1].items()
+    heads = [json.loads(text.partition("\n")[0]) for text in after.values()]
+    assert len({json.dumps((head["plan"]["scenario"], head["sha256"])) for head in heads}) == 1
+    assert _inputs(file) == _inputs(moved / "results.csv")
+
+
+def test_an_edited_network_is_not_continued_on(
+    moved: Path, elsewhere: Path, networks: dict[str, Path], capsys: pytest.CaptureFixture[str]
+) -> None:
+    """A file at the recorded place is meant; another content is another batch."""
+    file = _copied(moved, elsewhere)
+    (elsewhere / "networks").mkdir()
+    text = networks["crossing"].read_text("utf-8") + "<!-- edited -->\n"
+    (elsewhere / "networks" / "crossing.net.xml").write_text(text, "utf-8")
+    assert main(["run", "--resume", "-o", str(file), "--runs", "3", *QUIET]) == 2
+    assert "sha256: networks/crossing.net.xml was " in capsys.readouterr().err
+    assert main(["replay", str(file), "1"]) == 0  # which is of what was recorded
+
+
+def test_weights_are_carried(
+    networks: dict[str, Path], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """What an agent learned elsewhere: replayed, and its seeds are still excluded."""
+    words = ["run", "--net", str(networks["pedestrians"]), "--routes", "none", "--end", "5"]
+    words += ["--agent", "q-learning", "--runs", "2", *QUIET]
+    school, late = tmp_path / "school", tmp_path / "late"
+    for folder in (school, late):
+        folder.mkdir()
+    monkeypatch.chdir(school)
+    assert main([*words, "-o", "school.csv"]) == 0
+    param = ["--param", "weights=school.json", "--seed", "5", "-o", "../late/results.csv"]
+    assert main([*words, *param]) == 0
+    monkeypatch.chdir(late)
+    shutil.rmtree(school)
+    assert main(["replay", "results.csv", "1"]) == 0
+    certify = ["certify", "results.csv", "q-learning", "--runs", "1", "-q", "--exit-zero"]
+    assert main(certify) == 0
+    found = used([Path("results.csv")], {})
+    assert len(found.seeds) == 4
+    assert [str(file) for file in found.results] == ["results.csv", "school.csv"]
+
+
+# Of version 0.1
+
+
+def test_results_of_version_0_1_are_read(
+    moved: Path,
+    elsewhere: Path,
+    networks: dict[str, Path],
+    routes: dict[str, Path],
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    """Without the columns and the inputs that 0.2 added; they are not continued."""
+    assert set(OLD) == FIRST  # a column that is new since is declared to be (``Column.since``)
+    file = _copied(moved, elsewhere)
+    shutil.rmtree(elsewhere / "results" / "inputs")
+    with (moved / "results.csv").open(newline="") as source, file.open("w", newline="") as stream:
+        writer = csv.DictWriter(stream, OLD, extrasaction="ignore", lineterminator="\n")
+        writer.writeheader()
+        writer.writerows(csv.DictReader(source))
+    assert [row["arrived"] for row in rows(file)] == ["", ""]
+    assert cavsumo.load(file).rows["driven_m"].isna().all()
+    assert main(["report", str(file)]) == 0
+    named = ["--net", str(networks["crossing"]), "--routes", str(routes["crossing"])]
+    assert main(["replay", str(file), "1", *named]) == 0
+    assert main(["merge", str(file), "-o", "whole.csv", "-q"]) == 0
+    assert rows(elsewhere / "whole.csv")[0]["frozen"] == ""
+    for name, folder in ((networks, "networks"), (routes, "routes")):
+        (elsewhere / folder).mkdir()
+        shutil.copy(name["crossing"], elsewhere / folder)
+    capsys.readouterr()
+    before = file.read_bytes()
+    assert main(["run", "--resume", "-o", str(file), "--runs", "3", *QUIET]) == 2
+    assert "were written by an earlier version" in capsys.readouterr().err
+    assert file.read_bytes() == before
+
+
+def _copied(moved: Path, folder: Path, stem: str = "results") -> Path:
+    """Results of the moved folder in another one, to be changed."""
+    for end in (".csv", ".json"):
+        shutil.copy(moved / f"{stem}{end}", folder)
+    shutil.copytree(moved / stem, folder / stem)
+    return folder / f"{stem}.csv"
+
+
+def _inputs(file: Path) -> dict[str, bytes]:
+    """The kept inputs of results."""
+    return content(file.with_suffix("") / "inputs")
