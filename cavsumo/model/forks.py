@@ -146,6 +146,12 @@ def forked(
                 one.abandon()
 
 
+def result_of(work: Callable[[], Result], deadline: float) -> Result | BranchError:
+    """The result of one work, or its error."""
+    (found,) = forked([work], at_once=1, deadline=deadline)
+    return found
+
+
 class _Running(Generic[Result]):
     """A child whose result is awaited, and then its outcome."""
 
