@@ -12,6 +12,7 @@
     |-- AgentError              a tester agent raised or chose an action outside its space
     |-- SimulationError         SUMO refused a call, or the ego never entered the network
     |   `-- SimulationTaken     another world took the one simulation of this process
+    |-- BranchError             a branch of an episode was refused, raised, died or took too long
     |-- DivergenceError         a replay departs from its record (exit status 1)
     |-- BatchError              a batch cannot continue; finished rows are kept (exit status 3)
     `-- ResultsError            results on disk are missing, foreign or damaged (exit status 2)
@@ -77,6 +78,10 @@ class SimulationError(CavsumoError):
 
 class SimulationTaken(SimulationError):
     """Another world of this process began an episode: a process has one simulation."""
+
+
+class BranchError(CavsumoError):
+    """A branch of an episode was refused, raised, died or took too long."""
 
 
 class DivergenceError(CavsumoError):

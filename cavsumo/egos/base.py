@@ -65,6 +65,7 @@ class Ego:
             safe.
         sees_background: whether it uses the background traffic in the snapshots. See
             ``Agent.sees_background``.
+        outside: whether it drives from another process, which a branch of an episode would share.
     """
 
     PARAMETERS: ClassVar[Mapping[str, str]] = {}
@@ -72,6 +73,7 @@ class Ego:
     kind: Kind = EGO_KIND
     depart_speed: float | None = None
     sees_background: bool = True
+    outside: ClassVar[bool] = False
 
     def vtype(self) -> dict[str, str]:
         """The attributes of its SUMO vehicle type."""

@@ -172,7 +172,7 @@ class Senses:
     Args:
         ego, testers: the sensors of the ego and of every tester agent; None for a perfect one.
         teams: for each agent the indices of the bodies that it owns.
-        seeds: of the ego's noise and of each agent's.
+        rngs: generators of the ego's noise and of each agent's.
     """
 
     def __init__(
@@ -181,9 +181,8 @@ class Senses:
         ego: Sensor | None,
         testers: Sensor | None,
         teams: Sequence[Sequence[int]],
-        seeds: Sequence[np.random.SeedSequence],
+        rngs: Sequence[np.random.Generator],
     ) -> None:
-        rngs = [np.random.default_rng(seed) for seed in seeds]
         self._ego = None if ego is None else Observer(ego, scene, None, rngs[0])
         self._agents = [
             None if testers is None else Observer(testers, scene, team, rng)

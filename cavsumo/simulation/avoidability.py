@@ -9,32 +9,31 @@ learns from a rerun.
 
 from __future__ import annotations
 
-import dataclasses
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
 from cavsumo.agents.base import Agent
 from cavsumo.agents.recorded import Recorded
-from cavsumo.assertions.base import VIOLATED, Assertion, Judgement
-from cavsumo.assertions.contacts import STANDING_MPS, Contact
+from cavsumo.assertions.base import Assertion
+from cavsumo.assertions.contacts import STANDING_MPS
 from cavsumo.egos.reference import Reference
 from cavsumo.egos.reference.encounter import encounter
-from cavsumo.egos.reference.takeover import Takeover
-from cavsumo.errors import CavsumoError
+from cavsumo.errors import BranchError, CavsumoError
 from cavsumo.model.departures import Demand
+from cavsumo.model.forks import can_fork, result_of
 from cavsumo.model.scene import Scene
 from cavsumo.model.snapshot import BodyState, Snapshot
-from cavsumo.model.zone_presence import is_vehicle, ran_into
 from cavsumo.simulation.avoidability_guess import foreseen
 from cavsumo.simulation.loop import Episode
-from cavsumo.simulation.playback import playback, recorded
+from cavsumo.simulation.playback import recorded
+from cavsumo.simulation.reruns import Rerun
 from cavsumo.simulation.setup import Setup
 
 MOST_RERUNS = 6  # a search that needs more reports its bounds
 STRIDES = (1, 4)  # how far from the last answer the next one is asked for, then halfway [timesteps]
 NOTABLE_MPS = 1.5  # less speed lost avoids little
-STILL_MPS = 1e-6  # rounding apart, the ego has come to stand
+FORK_S = 3600.0  # time for a fork, far above that of any episode; the caller's own ends it before
 NOT_MONOTONE = "not monotone: a later takeover avoided it and an earlier one did not"
 
 
@@ -55,36 +54,8 @@ class Avoidability:
     note: str = ""
 
 
-class ContactWatch(Assertion):
-    """The assertion of a rerun: from the takeover on the moving ego touches no body.
-
-    A body that touches the standing ego, or a vehicle that runs into the side or rear of a moving
-    one, is no failure of the driver; nor is a body that the original touched before.
-
-    Args:
-        since: the timestep of the takeover.
-    """
-
-    name = "takeover"
-    sees_background = False
-
-    def __init__(self, since: int = -1) -> None:
-        self.since = since
-
-    def observe(self, snapshot: Snapshot, contacts: Sequence[Contact]) -> None:
-        ego = snapshot.ego
-        if snapshot.step <= self.since:
-            return
-        for contact in contacts:
-            if contact.a is not ego or ego.v <= STANDING_MPS:
-                continue
-            if not (is_vehicle(contact.b) and ran_into(contact.b, ego, self.scene.dt)):
-                self.decided = True
-                self.judgement = Judgement(self.name, VIOLATED, contact.b.id)
-
-
-class Diverged(CavsumoError):
-    """A rerun was not the same until the takeover."""
+class NotJudged(CavsumoError):
+    """A violation of which no reference driver can be judged."""
 
 
 @dataclass(frozen=True)
@@ -132,17 +103,17 @@ class AvoidabilityCheck:
             return Avoidability(None, note=f"not judged: {error}")
 
     def _judged(self, reference: Reference) -> Avoidability:
+        self._check_moving()
         end, frames = self.end, self.episode.frames
-        if frames[end].ego.v <= STANDING_MPS:
-            return Avoidability(
-                None, note="not judged: the ego stood, and the references only brake"
-            )
-        perceived, guess = self._risk(reference)
+        perceived, guess = self._perceived(reference), self._guess(reference)
         outcomes: dict[int, bool] = {end: False}
+        # The search asks for few takeovers before both, and for none in the last timestep.
+        first = max(0, min(perceived, guess) - sum(STRIDES))
+        avoided = self._forked(first) if first < end - 1 else self._avoided
 
         def avoids(step: int) -> bool:
             if step not in outcomes:
-                outcomes[step] = self._avoided(reference, step)
+                outcomes[step] = avoided(reference, step)
             return outcomes[step]
 
         avoidable = avoids(perceived)
@@ -158,23 +129,46 @@ class AvoidabilityCheck:
             return Avoidability(avoidable, note=note)
         return Avoidability(avoidable, frames[low].time, frames[end].time - frames[low].time, note)
 
-    def _risk(self, reference: Reference) -> tuple[int, int]:
-        """When the reference perceives the risk, and a guess of the last chance, as timesteps.
+    def avoidable(self, reference: Reference) -> bool:
+        """Whether a reference driver would have avoided it, by one rerun at most.
+
+        Raises NotJudged for a violation by a standing ego, Diverged if the rerun is another
+        episode.
+        """
+        self._check_moving()
+        perceived = self._perceived(reference)
+        return perceived < self.end and self._avoided(reference, perceived)
+
+    def _check_moving(self) -> None:
+        """Raise NotJudged if the ego stood at the violation."""
+        if self.episode.frames[self.end].ego.v <= STANDING_MPS:
+            raise NotJudged("the ego stood, and the references only brake")
+
+    def _perceived(self, reference: Reference) -> int:
+        """The timestep at which the reference perceives the risk.
 
         Without a body to look at it is the trigger of the assertion.
         """
-        dt, end = self.setup.world.dt, self.end
-        bodies = self._bodies()
+        bodies = self._bodies
         if bodies is None:
-            return self._trigger(), end - self._delay(reference)
-        scene, frames = self._scene(), self.episode.frames[: end + 1]
+            return self._trigger()
+        scene, frames = self._scene(), self.episode.frames[: self.end + 1]
         met = [b and encounter(scene, f, b) for f, b in zip(frames, bodies, strict=True)]
-        found = reference.perceived(met, dt)
+        found = reference.perceived(met, self.setup.world.dt)
+        return self.end if found is None else found
+
+    def _guess(self, reference: Reference) -> int:
+        """A guess of the last chance, as a timestep."""
+        dt, end, bodies = self.setup.world.dt, self.end, self._bodies
+        if bodies is None:
+            return end - self._delay(reference)
         there = [b for b in bodies if b is not None]
-        guess = foreseen(frames, there, reference, dt) if len(there) == len(bodies) else end - 1
+        guess = end - 1
+        if len(there) == len(bodies):
+            guess = foreseen(self.episode.frames[: end + 1], there, reference, dt)
         if self.episode.judgement.impact_speed is None:  # it needs no touch to be violated
             guess = min(guess, end - self._delay(reference))
-        return (end if found is None else found), guess
+        return guess
 
     def _delay(self, reference: Reference) -> int:
         """How many timesteps it takes a reference to change the course of things a little."""
@@ -187,6 +181,7 @@ class AvoidabilityCheck:
         time = self.episode.judgement.trigger_time or 0.0
         return min(round(time / self.setup.world.dt), self.end)
 
+    @cached_property
     def _bodies(self) -> list[BodyState | None] | None:
         """The body of the violation at each timestep up to it; None when none is involved."""
         name = self.episode.judgement.tester
@@ -203,40 +198,56 @@ class AvoidabilityCheck:
     def _avoided(self, reference: Reference, step: int) -> bool:
         """Whether the ego that is taken over at a timestep violates nothing and hits nobody.
 
-        Known as soon as it stands, where it is about contact or the assertion has decided; else at
-        the end of the episode.
+        Found by a rerun from the start.
         """
         self.beat()
-        episode, broken, watch = self.episode, self.broken, ContactWatch(step)
+        return self._rerun().avoids(reference, step)
+
+    def _rerun(self) -> Rerun:
+        """The episode about to be played again, in this process."""
         # Bodies that the rerun leaves out count with their states of the first episode.
         record = self.record or any(a.sees_background for a in self.setup.assertions)
-        ego = Takeover(self.setup.ego, reference, step, drives=episode.drives)
-        setup = dataclasses.replace(self.setup, ego=ego, assertions=(broken, watch))
-        rerun = playback(setup, self._recorded, record=record, alike=self.agents)
-        by_contact = episode.judgement.impact_speed is not None
-        while True:
-            now = rerun.snapshot
-            if now.step <= step:
-                self._check_same(now)
-            if VIOLATED in (broken.judgement.verdict, watch.judgement.verdict):
-                return False
-            stands = now.step > step and now.ego.v < STILL_MPS
-            if rerun.over or (stands and (by_contact or broken.decided)):
-                return True
-            rerun.step()
+        return Rerun(self.setup, self._recorded, self.episode, self.broken, record, self.agents)
 
-    def _check_same(self, now: Snapshot) -> None:
-        """Raise Diverged unless a snapshot is the recorded one."""
-        recorded = self.episode.frames[now.step]
-        if now == recorded:
-            return
-        what = "the ego" if now.ego != recorded.ego else "somebody"
-        raise Diverged(f"the episode again is another one: {what} differs at {now.time:.2f} s")
+    def _forked(self, first: int) -> Callable[[Reference, int], bool]:
+        """``_avoided`` by forks of one rerun that has come to a timestep, where that is possible.
+
+        An earlier takeover, or a fork that fails, is found out by a rerun of its own.
+        """
+        if self.setup.ego.outside or not can_fork():
+            return self._avoided
+        self.beat()
+        rerun = self._rerun()
+        rerun.advance(first)
+        alone = False  # whether another rerun has taken its simulation
+
+        def avoids(reference: Reference, step: int) -> bool:
+            nonlocal alone
+            if not alone and step >= rerun.step:
+                self.beat()
+                found = result_of(lambda: rerun.avoids(reference, step), FORK_S)
+                if not isinstance(found, BranchError):
+                    return found
+            alone = True
+            return self._avoided(reference, step)
+
+        return avoids
 
     @cached_property
     def _recorded(self) -> Recorded:
         """The episode, to be played back."""
         return recorded(self.setup, self.episode, self.seed, self.demand)
+
+
+def preventable(check: AvoidabilityCheck, reference: Reference) -> bool | None:
+    """Whether a reference driver would have avoided a violation, and no more; None if not judged.
+
+    One rerun at most, where ``AvoidabilityCheck.judged`` also finds out until when.
+    """
+    try:
+        return check.avoidable(reference)
+    except CavsumoError:
+        return None
 
 
 def latest(

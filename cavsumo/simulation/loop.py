@@ -98,8 +98,10 @@ class EpisodeLoop:
         demand: departures of the background that were recorded, in place of the scenario's demand.
 
     Attributes:
+        setup: with which it is played.
         scene: the constant part of the episode.
         snapshot: the true state now.
+        history: all states so far.
         ego_view, agent_views: the views of the ego and of each agent.
         over: whether it has ended.
     """
@@ -115,17 +117,21 @@ class EpisodeLoop:
         simulation: Simulation = "own",
         demand: Demand | None = None,
     ) -> None:
-        self._setup, self._agents, self._record = setup, agents, record or keep
-        self.scene, self._senses, begun = _reset(setup, agents, seed, record, simulation, demand)
+        self.setup, self._agents = setup, agents
+        self.scene, self._senses, begun, self._generators = _reset(
+            setup, agents, seed, record, simulation, demand
+        )
         self.snapshot = begun.snapshot
         self._show(self.snapshot)
         self._rewards = RewardMonitor(self.scene, setup.teams)
         self._episode = Episode(Judgement(""), starts=begun.starts, waited=begun.waited)
         self._episode.forecast = _foretold(agents, self.agent_views)
         self._validity = ValidityMonitor(self.scene)
-        self._history: list[Snapshot] = []  # from which blame and progress are found
+        self.history: list[Snapshot] = []  # from which blame and progress are found
+        self._chosen: list[Joint] = []
+        self._keep(record or keep)
         self._arrived = False
-        self._learners = any(type(a).process_feedback is not Agent.process_feedback for a in agents)
+        self._learners = _learn(agents)
         self._observe(self.snapshot)
         self._end(_over(setup, self.snapshot))
 
@@ -134,14 +140,13 @@ class EpisodeLoop:
 
         None once their game is over, although the episode may continue until all assertions decide.
         """
-        setup, episode, snapshot, agents = self._setup, self._episode, self.snapshot, self._agents
+        setup, episode, snapshot, agents = self.setup, self._episode, self.snapshot, self._agents
         scene, views = self.scene, self.agent_views
         actions = [a.choose_action(view) for a, view in zip(agents, views, strict=True)]
         states = _moved(snapshot.testers, setup.teams, actions, scene.dt)
         command = setup.ego.act(self.ego_view)
         episode.drives = isinstance(command, Drive)
-        if self._record:
-            episode.actions.append(actions)
+        self._chosen.append(actions)
         successor = setup.world.step(states, command)
         if successor is None or (episode.drives and _at_end(scene, successor)):
             self._arrived = True
@@ -162,6 +167,43 @@ class EpisodeLoop:
         self._end(_over(setup, successor))
         return rewards
 
+    def hand_over(
+        self,
+        agents: Sequence[Agent] | None = None,
+        ego: Ego | None = None,
+        seed: int | None = None,
+        *,
+        record: bool = False,
+    ) -> None:
+        """Let others choose from this timestep on: the episode becomes another one.
+
+        Args:
+            agents: in place of those so far, who else continue; one for each team.
+            ego: likewise; its box is that of the ego that it replaces.
+            seed: of all random numbers from now on, SUMO's too; None for those that would have
+                followed.
+            record: keep every snapshot and action, and show everybody from now on.
+        """
+        setup, scene = self.setup, self.scene
+        everybody = record or any(who.sees_background for who in (ego, *(agents or ())) if who)
+        fresh = self._generators if seed is None else _generators(setup, seed)
+        for own, other in zip(self._generators, fresh, strict=True):
+            own.bit_generator.state = other.bit_generator.state
+        if seed is not None:
+            setup.world.reseed(seed)
+            scene = dataclasses.replace(scene, seed=seed)
+        if agents is not None:
+            self._agents, self._learners = agents, _learn(agents)
+            _cast(setup, agents, scene, self._generators)
+        if ego is not None:
+            ego.prepare(setup.mission)
+            ego.reset(scene)
+            self.setup = dataclasses.replace(setup, ego=ego)
+        if everybody:
+            self.snapshot = setup.world.show_everybody()
+            self._show(self.snapshot)
+        self._keep(record)
+
     @property
     def contacts(self) -> ContactMonitor:
         """The contacts so far."""
@@ -170,7 +212,7 @@ class EpisodeLoop:
     @property
     def judgement(self) -> Judgement:
         """The most serious judgement of the assertions so far."""
-        return weightiest(self._setup.assertions)
+        return weightiest(self.setup.assertions)
 
     @property
     def outcome(self) -> str:
@@ -179,17 +221,17 @@ class EpisodeLoop:
 
     def finished(self) -> Episode:
         """The record of the episode, possibly so far."""
-        episode = _finished(self._setup, self._episode, self.snapshot, self._rewards)
+        episode = _finished(self.setup, self._episode, self.snapshot, self._rewards)
         episode.rms_acceleration = episode.naturalness.rms_acceleration(
             episode.steps, self.scene.dt
         )
         spoilt = self._validity.spoils(episode.judgement)
-        late = self.snapshot.time >= self._setup.scenario.end - 1e-9
+        late = self.snapshot.time >= self.setup.scenario.end - 1e-9
         arrived = True if self._arrived else False if late else None
-        episode.progress = ego_progress(self.scene, self._history, arrived)
+        episode.progress = ego_progress(self.scene, self.history, arrived)
         episode.invalid, episode.breach = spoilt is not None, spoilt or self._validity.first
         if episode.outcome == VIOLATED:
-            episode.blame = blamed(self.scene, self._history, episode.judgement)
+            episode.blame = blamed(self.scene, self.history, episode.judgement)
         return episode
 
     def _observe(self, snapshot: Snapshot) -> None:
@@ -197,7 +239,7 @@ class EpisodeLoop:
 
         The testers are checked until an assertion is violated: later breaches change no verdict.
         """
-        episode, assertions = self._episode, self._setup.assertions
+        episode, assertions = self._episode, self.setup.assertions
         contacts = episode.contacts.observe(snapshot)
         if not any(a.judgement.verdict == VIOLATED for a in assertions):
             self._validity.observe(snapshot, episode.contacts.pairs)
@@ -205,16 +247,19 @@ class EpisodeLoop:
         episode.criticality.observe(snapshot, contacts)
         for assertion in assertions:
             assertion.observe(snapshot, contacts)
-        self._history.append(snapshot)
-        if self._record:
-            episode.frames.append(snapshot)
+        self.history.append(snapshot)
+
+    def _keep(self, kept: bool) -> None:
+        """Whether snapshots and actions, of all timesteps, are in the record of the episode."""
+        self._episode.frames = self.history if kept else []
+        self._episode.actions = self._chosen if kept else []
 
     def _end(self, over: bool) -> None:
         """Note whether the episode is over; if so, the ego and the assertions are told."""
         self.over = over
         if over:
-            self._setup.ego.conclude()
-            for assertion in self._setup.assertions:
+            self.setup.ego.conclude()
+            for assertion in self.setup.assertions:
                 assertion.conclude()
 
     def _show(self, snapshot: Snapshot) -> None:
@@ -248,10 +293,9 @@ def _reset(
     record: bool,
     simulation: Simulation,
     demand: Demand | None,
-) -> tuple[Scene, Senses | None, Placed]:
+) -> tuple[Scene, Senses | None, Placed, list[np.random.Generator]]:
     """Place the testers and begin an episode; one generator for each who draws."""
-    streams = np.random.SeedSequence(seed)
-    _, electing, *rest = map(np.random.default_rng, streams.spawn(2 + len(agents)))
+    generators = _generators(setup, seed)
     scenario = setup.scenario
     placing = starts_generator(seed if scenario.starts_seed is None else scenario.starts_seed)
     watching: list[Ego | Agent | Assertion] = [setup.ego, *agents, *setup.assertions]
@@ -270,14 +314,38 @@ def _reset(
     ego = setup.world.ego_body
     scene = setup.site.scene(setup.world.dt, ego, setup.bodies, begun.starts, seed)
     scene = dataclasses.replace(scene, horizon=scenario.end)
-    senses = _senses(setup, scene, streams)
-    for agent, team, rng in zip(agents, setup.teams, rest, strict=True):
-        agent.reset(scene, team, rng)
-    type(agents[0]).coordinate(agents, electing)
+    senses = _senses(setup, scene, generators[1 + len(agents) :])
+    _cast(setup, agents, scene, generators)
     setup.ego.reset(scene)
     for assertion in setup.assertions:
         assertion.reset(scene)
-    return scene, senses, begun
+    return scene, senses, begun, generators
+
+
+def _generators(setup: Setup, seed: int) -> list[np.random.Generator]:
+    """The generators of an episode: for coordination, each agent, the ego's and agents' sensors.
+
+    Those of sensors come after all others, which are the same with sensors and without. The first
+    stream is that of the starts (``starts_generator``).
+    """
+    streams, teams = np.random.SeedSequence(seed), len(setup.teams)
+    _, *seeds = streams.spawn(2 + teams)
+    return [np.random.default_rng(s) for s in (*seeds, *streams.spawn(1 + teams))]
+
+
+def _cast(
+    setup: Setup, agents: Sequence[Agent], scene: Scene, generators: Sequence[np.random.Generator]
+) -> None:
+    """Have the agents begin, each with its team and generator, and know each other."""
+    electing, *rest = generators[: 1 + len(setup.teams)]
+    for agent, team, rng in zip(agents, setup.teams, rest, strict=True):
+        agent.reset(scene, team, rng)
+    type(agents[0]).coordinate(agents, electing)
+
+
+def _learn(agents: Sequence[Agent]) -> bool:
+    """Whether any agent learns from feedback."""
+    return any(type(a).process_feedback is not Agent.process_feedback for a in agents)
 
 
 def _foretold(agents: Sequence[Agent], views: Sequence[Snapshot]) -> Forecast | None:
@@ -286,16 +354,12 @@ def _foretold(agents: Sequence[Agent], views: Sequence[Snapshot]) -> Forecast | 
     return max((one for one in said if one is not None), default=None, key=Forecast.rank)
 
 
-def _senses(setup: Setup, scene: Scene, streams: np.random.SeedSequence) -> Senses | None:
-    """The observers of an episode, None with full observability.
-
-    Their generators come after all others, which are the same with sensors and without.
-    """
+def _senses(setup: Setup, scene: Scene, generators: Sequence[np.random.Generator]) -> Senses | None:
+    """The observers of an episode, None with full observability."""
     ego, testers = setup.scenario.ego_sensor, setup.scenario.tester_sensor
     if not (ego or testers):
         return None
-    seeds = streams.spawn(1 + len(setup.teams))
-    return Senses(scene, ego, testers, setup.teams, seeds)
+    return Senses(scene, ego, testers, setup.teams, generators)
 
 
 def _moved(

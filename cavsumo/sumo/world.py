@@ -15,12 +15,13 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from tempfile import TemporaryDirectory
+from typing import Any
 
 import libsumo
 import shapely
 
 from cavsumo.egos.base import Acceleration, Command, Drive, Ego
-from cavsumo.errors import NoSuchAction, SimulationError, SimulationTaken
+from cavsumo.errors import EgoError, NoSuchAction, SimulationError, SimulationTaken
 from cavsumo.model.bodies import PEDESTRIAN, Body
 from cavsumo.model.carriageway import Start
 from cavsumo.model.departures import Demand
@@ -33,6 +34,7 @@ from cavsumo.sumo.background import Background, Roaming, roaming
 from cavsumo.sumo.connection import Simulations
 from cavsumo.sumo.demand import DepartureNotes
 from cavsumo.sumo.poses import from_sumo, front
+from cavsumo.sumo.reseeding import reseed
 
 EGO = "ego"
 ENTRY_S = 30.0  # longest wait of the ego for room to enter the network
@@ -69,6 +71,7 @@ class World:
         self._heard = (folder / "stderr.log").open("ab")
         self.simulations = Simulations(libsumo, scenario, site, ego, folder)
         self._roaming: Roaming | None = None
+        self._calls: list[tuple[str, tuple[Any, ...]]] = []  # what ``again`` does again
         self._mark = object()  # stands for this world in _PLAYING without keeping it alive
         shapely.prepare(site.crossings)
         self._walks = [crossing.light for crossing in site.marked]
@@ -115,6 +118,21 @@ class World:
         Raises SimulationError with SUMO's message if SUMO refuses, or if the ego finds no room to
         enter.
         """
+        how = everything, simulation, demand, note
+        self._calls = [("_begin", (seed, tuple(states), tuple(starts), *how))]
+        return self._begin(seed, states, starts, *how)
+
+    def _begin(
+        self,
+        seed: int,
+        states: Sequence[BodyState],
+        starts: Sequence[Start],
+        everything: bool,
+        simulation: Simulation,
+        demand: Demand | None,
+        note: bool,
+    ) -> Snapshot:
+        """Begin an episode, see ``reset``."""
         self.collisions: set[tuple[str, str]] = set()
         self.teleports = self.emergency_stops = 0
         self._driven: BodyState | None = None
@@ -134,8 +152,49 @@ class World:
             ego = self._enter(states)
             self._make_room(states, starts)
         self._ego, self._states = ego, tuple(states)
+        self._everything = everything
         self._background = self._lookout(everything, (ego, *states))
         return self._snapshot(ego, tuple(states))
+
+    @property
+    def told(self) -> int:
+        """How many calls have led here from the beginning of the episode."""
+        return len(self._calls)
+
+    @property
+    def repeatable(self) -> bool:
+        """Whether the simulation belongs to this episode alone, so that its past is known."""
+        (_, (*_, simulation, _, _)), *_ = self._calls
+        return bool(simulation == "own")
+
+    def again(self, told: int) -> Snapshot | None:
+        """Bring a new simulation to an earlier moment of the episode, by telling it the same.
+
+        Args:
+            told: how many calls had led there (``told``).
+
+        Returns the last snapshot of then, with the same bits if SUMO does the same again.
+        """
+        assert self.repeatable
+        self._calls = self._calls[:told]
+        snapshot: Snapshot | None = None
+        for name, arguments in tuple(self._calls):
+            snapshot = getattr(self, name)(*arguments)
+        return snapshot
+
+    def reseed(self, seed: int) -> None:
+        """Let SUMO draw other random numbers from now on, those of a start with that seed.
+
+        Raises SimulationError if this build of libsumo cannot.
+        """
+        reseed(libsumo, seed)
+
+    def show_everybody(self) -> Snapshot:
+        """This moment with the whole background, which is shown from now on."""
+        if not self._everything:
+            self._everything = True
+            self._background = self._lookout(True, (self._ego, *self._states))
+        return self._snapshot(self._ego, self._states)
 
     def everybody(self) -> tuple[RawState, ...]:
         """All bodies but the ego and the testers, at any distance."""
@@ -145,6 +204,12 @@ class World:
 
     def shift(self, states: tuple[BodyState, ...]) -> Snapshot:
         """The first snapshot once more, with the testers elsewhere; before any timestep."""
+        self._calls.append(("_shift", (states,)))
+        return self._shift(states)
+
+    def _shift(self, states: tuple[BodyState, ...]) -> Snapshot:
+        """The first snapshot with the testers elsewhere."""
+        self._states = states
         return self._snapshot(self._ego, states)
 
     def step(self, states: tuple[BodyState, ...], command: Command) -> Snapshot | None:
@@ -156,6 +221,11 @@ class World:
 
         Raises SimulationTaken when another world has begun an episode meanwhile.
         """
+        self._calls.append(("_go_on", (states, command)))
+        return self._go_on(states, command)
+
+    def _go_on(self, states: tuple[BodyState, ...], command: Command) -> Snapshot | None:
+        """Advance one timestep, see ``step``."""
         if _PLAYING[0] is not self._mark:
             self._check_own()
         try:
@@ -171,7 +241,7 @@ class World:
             return None
         if self._driven is None:
             self._steering = self._implied_steering(ego)
-        self._ego = ego
+        self._ego, self._states = ego, states
         return self._snapshot(ego, states)
 
     def _check_own(self) -> None:
@@ -291,6 +361,8 @@ class World:
             libsumo.vehicle.setSpeedMode(EGO, UNSAFE)
         ego, kind = self._ego, self.ego_body.kind
         if isinstance(command, Acceleration):
+            if self._driven is not None:
+                raise EgoError("an ego that steers itself cannot be handed to one that does not")
             v = min(kind.v_max, max(kind.v_min, ego.v + command.value * self.dt))
             libsumo.vehicle.setSpeed(EGO, v)
         elif isinstance(command, Drive):

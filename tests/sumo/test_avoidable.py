@@ -36,9 +36,9 @@ from cavsumo.simulation.avoidability import (
     NOT_MONOTONE,
     Avoidability,
     AvoidabilityCheck,
-    ContactWatch,
 )
 from cavsumo.simulation.loop import EpisodeLoop, play
+from cavsumo.simulation.reruns import ContactWatch
 from cavsumo.simulation.setup import Setup, make_setup
 
 LANE_Y, SPEED, WALK, DT = -1.825, 8.0, 1.4, 0.1
@@ -289,7 +289,8 @@ def test_sumos_driver_obeys_from_the_takeover_on(staged: Staged) -> None:
     """It drives as it likes before, reaction time and all; then every timestep is commanded."""
     plan, site = staged("pedestrians", testers=1)
     setup = make_setup(plan.scenario, site)
-    ego = Takeover(setup.ego, REFERENCES.make("ideal", {}), 23, drives=False)
+    ego = Takeover(setup.ego, drives=False)
+    ego.take_over(REFERENCES.make("ideal", {}), 23)
     with_it = dataclasses.replace(setup, ego=ego, assertions=(ContactWatch(),))
     try:
         alone = _speeds(EpisodeLoop(setup, [Agent()], 5), 40)

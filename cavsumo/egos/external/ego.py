@@ -34,6 +34,8 @@ EXTERNAL: Registry[ExternalEgo] = Registry(EXTERNAL_NAMES)
 class ExternalEgo(Ego, ABC):
     """Base of both; the spec is its name in messages."""
 
+    outside = True
+
     PARAMETERS: ClassVar[Mapping[str, str]] = {
         "reply_s": "real time within which it must answer an observation [s]",
         "start_s": "real time within which it must answer a hello or a reset [s]",

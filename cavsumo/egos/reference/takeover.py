@@ -18,16 +18,20 @@ class Takeover(Ego):
 
     Args:
         ego: the original; it is not closed.
-        reference: the driver that takes over.
-        step: the timestep from which on the reference decides.
         drives: whether the original steers itself; the reference then also steers, by pure pursuit
             of the path, else SUMO steers.
     """
 
-    def __init__(self, ego: Ego, reference: Reference, step: int, *, drives: bool) -> None:
-        self._ego, self._reference, self._step, self._drives = ego, reference, step, drives
+    def __init__(self, ego: Ego, *, drives: bool) -> None:
+        self._ego, self._drives = ego, drives
+        self._reference: Reference | None = None
+        self._step = 0
         self.kind, self.depart_speed = ego.kind, ego.depart_speed
         self.sees_background = ego.sees_background
+
+    def take_over(self, reference: Reference, step: int) -> None:
+        """Have a reference driver decide from a timestep on, which has not been played yet."""
+        self._reference, self._step = reference, step
 
     def vtype(self) -> dict[str, str]:
         return self._ego.vtype()
@@ -41,13 +45,14 @@ class Takeover(Ego):
 
     def act(self, snapshot: Snapshot) -> Command:
         v = snapshot.ego.v
-        if snapshot.step < self._step:
+        reference = self._reference
+        if reference is None or snapshot.step < self._step:
             self._before = v
             return self._ego.act(snapshot)
         if snapshot.step == self._step and self._before is not None:
             self._kept = min(0.0, (v - self._before) / self._dt)
         elapsed = (snapshot.step - self._step) * self._dt
-        braking = self._reference.throttle(elapsed, self._dt, self.kind)
+        braking = reference.throttle(elapsed, self._dt, self.kind)
         a = max(self.kind.throttle_min, min(self._kept, braking), -max(0.0, v) / self._dt)
         if self._drives:
             return Drive(a, self._course.steering(snapshot.ego))

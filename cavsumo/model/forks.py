@@ -1,0 +1,274 @@
+"""Results computed in forked children of this process, each with a deadline (Linux).
+
+A child has all that this process has in memory, and shares none of its conversations: files that
+are being read are opened once more at the same place; pipes, sockets and files that are written
+lead nowhere, except stdout and stderr. It ends by ``os._exit``, so that it cleans up nothing that
+belongs to this process, and Linux kills it when this process dies.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import fcntl
+import os
+import pickle
+import random
+import selectors
+import signal
+import stat
+import sys
+import threading
+import time
+from collections import deque
+from collections.abc import Callable, Iterable, Iterator
+from pathlib import Path
+from typing import Any, Generic, TypeVar
+
+from cavsumo.errors import BranchError, CavsumoError
+from cavsumo.model.offspring import kill_descendants
+from cavsumo.model.processes import end_with_parent, ending
+
+Result = TypeVar("Result")
+
+HEAD = 8  # bytes in which a child sends the length of its result
+CHUNK = 1 << 20  # bytes read at once
+ALARM_AFTER_S = 30.0  # time after its deadline at which a child ends by itself
+
+
+def can_fork() -> bool:
+    """Whether a fork of this process has all that it needs.
+
+    A fork has one thread, so what other threads of Python hold would be held for ever. Threads of
+    numpy's linear algebra end before a fork and begin anew after it.
+    """
+    return sys.platform == "linux" and threading.active_count() == 1
+
+
+class Fork(Generic[Result]):
+    """A child that computes one result.
+
+    Args:
+        work: called in the child; its result must be picklable.
+        deadline: how long it may take [s].
+
+    Attributes:
+        source: the descriptor from which its result is read.
+        ends: when it is due, on the clock of ``time.monotonic`` [s].
+    """
+
+    def __init__(self, work: Callable[[], Result], deadline: float) -> None:
+        self._deadline, self.ends = deadline, time.monotonic() + deadline
+        self._received = bytearray()
+        places, follow_parent = _places(), end_with_parent(os.getpid())
+        drawn = random.getstate()  # Python seeds it anew in a fork
+        _flush()
+        self.source, sink = os.pipe()
+        try:
+            self._pid = os.fork()
+        except OSError as error:
+            os.close(self.source)
+            os.close(sink)
+            raise BranchError(f"no process for a branch: {error}") from error
+        if self._pid == 0:
+            try:
+                follow_parent()
+                _stand_alone(places, deadline)
+                random.setstate(drawn)
+                _send(sink, _outcome(work))
+                _leave()
+            finally:
+                os._exit(1)
+        os.close(sink)
+
+    def receive(self) -> bool:
+        """Read what has arrived; whether that is all of the result, or all that there will be."""
+        piece = os.read(self.source, CHUNK)
+        self._received += piece
+        return not piece or len(self._received) >= HEAD + self._length()
+
+    def result(self) -> Result:
+        """The result that was received; raises BranchError if it is none."""
+        length = self._length()
+        if len(self._received) < HEAD + length:
+            raise BranchError(f"a branch {self.end()}")
+        good, value = pickle.loads(memoryview(self._received)[HEAD : HEAD + length])
+        self.end()
+        if not good:
+            raise BranchError(value)
+        result: Result = value
+        return result
+
+    def overdue(self) -> BranchError:
+        """The error of a child that took too long, which is killed."""
+        self.kill()
+        return BranchError(f"a branch gave no result within {self._deadline:g} s")
+
+    def end(self) -> str:
+        """Wait for the end of a child that has sent all; how it ended, in words."""
+        os.close(self.source)
+        _, status = os.waitpid(self._pid, 0)
+        return ending(os.waitstatus_to_exitcode(status))
+
+    def kill(self) -> None:
+        """Kill the child and what it has started."""
+        os.kill(self._pid, signal.SIGSTOP)  # so that it starts no others
+        kill_descendants(self._pid)
+        os.kill(self._pid, signal.SIGKILL)
+        self.end()
+
+    def _length(self) -> int:
+        """The length of the result, as far as it is known."""
+        return int.from_bytes(self._received[:HEAD], "little")
+
+
+def forked(
+    works: Iterable[Callable[[], Result]], *, at_once: int, deadline: float
+) -> Iterator[Result | BranchError]:
+    """The result of each work, or its error, in their order.
+
+    Args:
+        at_once: children that run at the same time, at most.
+        deadline: of each [s].
+    """
+    waiting, running = iter(works), deque[_Running[Result]]()
+    with selectors.DefaultSelector() as selector:
+        try:
+            while True:
+                while len(running) < at_once and (work := next(waiting, None)) is not None:
+                    running.append(_Running(work, deadline, selector))
+                if not running:
+                    return
+                while not running[0].done:
+                    _wait(selector, running)
+                yield running.popleft().outcome
+        finally:
+            for one in running:
+                one.abandon()
+
+
+def result_of(work: Callable[[], Result], deadline: float) -> Result | BranchError:
+    """The result of one work, or its error."""
+    (found,) = forked([work], at_once=1, deadline=deadline)
+    return found
+
+
+class _Running(Generic[Result]):
+    """A child whose result is awaited, and then its outcome."""
+
+    outcome: Result | BranchError
+
+    def __init__(
+        self, work: Callable[[], Result], deadline: float, selector: selectors.BaseSelector
+    ) -> None:
+        self.done, self._selector = False, selector
+        self.fork = Fork(work, deadline)
+        selector.register(self.fork.source, selectors.EVENT_READ, self)
+
+    def read(self) -> None:
+        """Take what has arrived."""
+        if self.fork.receive():
+            self._finish()
+            try:
+                self.outcome = self.fork.result()
+            except BranchError as error:
+                self.outcome = error
+
+    def check(self) -> None:
+        """Kill it if it is overdue."""
+        if not self.done and time.monotonic() >= self.fork.ends:
+            self._finish()
+            self.outcome = self.fork.overdue()
+
+    def abandon(self) -> None:
+        """Kill it if it is not done."""
+        if not self.done:
+            self._finish()
+            self.fork.kill()
+
+    def _finish(self) -> None:
+        self.done = True
+        self._selector.unregister(self.fork.source)
+
+
+def _wait(selector: selectors.BaseSelector, running: Iterable[_Running[Any]]) -> None:
+    """Wait until something arrives or is overdue, and see to it."""
+    next_end = min(one.fork.ends for one in running if not one.done)
+    for key, _ in selector.select(max(0.0, next_end - time.monotonic())):
+        key.data.read()
+    for one in running:
+        one.check()
+
+
+# In the child, and what it needs from its parent
+
+
+def _flush() -> None:
+    """Write out what is buffered, or both processes would write it."""
+    for stream in (sys.stdout, sys.stderr):
+        if stream is not None:
+            with contextlib.suppress(OSError, ValueError):
+                stream.flush()
+
+
+def _places() -> dict[int, int | None]:
+    """The open descriptors but stdout and stderr; those of files being read with their places."""
+    found: dict[int, int | None] = {}
+    for entry in Path("/proc/self/fd").iterdir():
+        number = int(entry.name)
+        if number in (1, 2):
+            continue
+        with contextlib.suppress(OSError):  # that of the listing itself
+            reads = fcntl.fcntl(number, fcntl.F_GETFL) & os.O_ACCMODE == os.O_RDONLY
+            is_file = stat.S_ISREG(os.fstat(number).st_mode)
+            found[number] = os.lseek(number, 0, os.SEEK_CUR) if reads and is_file else None
+    return found
+
+
+def _stand_alone(places: dict[int, int | None], deadline: float) -> None:
+    """Share no descriptor and no signal handler with the parent."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # the parent decides what Ctrl-C means
+    signal.signal(signal.SIGALRM, signal.SIG_DFL)
+    signal.signal(signal.SIGTERM, signal.SIG_DFL)
+    signal.setitimer(signal.ITIMER_REAL, deadline + ALARM_AFTER_S)
+    nowhere = os.open(os.devnull, os.O_RDWR)
+    for number, place in places.items():
+        if place is None:
+            os.dup2(nowhere, number, inheritable=False)
+            continue
+        again = os.open(f"/proc/self/fd/{number}", os.O_RDONLY)
+        os.lseek(again, place, os.SEEK_SET)
+        os.dup2(again, number, inheritable=False)
+        os.close(again)
+
+
+def _outcome(work: Callable[[], Any]) -> bytes:
+    """Whether a work succeeded, and its result or a sentence, pickled."""
+    try:
+        return pickle.dumps((True, work()), pickle.HIGHEST_PROTOCOL)
+    except CavsumoError as error:
+        return pickle.dumps((False, str(error)))
+    except Exception as error:
+        return pickle.dumps((False, f"defect: {error!r}"))
+
+
+def _send(sink: int, data: bytes) -> None:
+    """Send all of a result, its length first."""
+    left = memoryview(len(data).to_bytes(HEAD, "little") + data)
+    while left:
+        left = left[os.write(sink, left) :]
+
+
+def _leave() -> None:
+    """End this process, and before it those that it has started."""
+    _flush()
+    if _has_children():
+        kill_descendants(os.getpid())
+    os._exit(0)
+
+
+def _has_children() -> bool:
+    """Whether this process has children; True where the system does not say."""
+    try:
+        return bool(Path(f"/proc/self/task/{os.getpid()}/children").read_bytes())
+    except OSError:
+        return True
