@@ -162,7 +162,8 @@ def refused(
 
     def no(*words: str) -> str:
         monkeypatch.chdir(tmp_path)
-        assert main(["run", "-n", str(networks["pedestrians"]), *words]) == 2
+        net = [] if "--net" in words else ["-n", str(networks["pedestrians"])]
+        assert main(["run", *net, *words]) == 2
         said = capsys.readouterr().err
         assert said.count("\n") == 1, said
         assert list(tmp_path.iterdir()) == [], "something was written"

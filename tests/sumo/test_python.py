@@ -157,7 +157,7 @@ def test_an_interrupt_keeps_what_ran(tmp_path: Path, monkeypatch: pytest.MonkeyP
         ({"executor": "processes"}, "executor: expected a concurrent.futures.Executor"),
         ({"output": "results.txt"}, "expected a name that ends in .csv"),
         ({"resume": True}, "go on with an output"),
-        ({"config": "nowhere.toml"}, "config 'nowhere.toml': No such file"),
+        ({"config": "nowhere.toml"}, "config 'nowhere.toml': cannot be read: No such file"),
     ],
 )
 def test_a_wrong_argument_is_one_sentence(
@@ -238,8 +238,9 @@ def test_a_report_has_the_format_of_its_name(
 def test_results_say_what_was_found(results: Results, by_command: Path) -> None:
     """In one line, and as tables for a notebook."""
     failures = int((results.rows["outcome"] == "violated").sum())
+    preventable = int((results.rows["avoidable"] == 1).sum())
     assert repr(results).startswith("<Results: 10 episodes on crossing, ego sumo: ")
-    assert f"{failures} failures" in repr(results)
+    assert f": {preventable} preventable failure" in repr(results)
     assert str(by_command) in repr(cavsumo.load(by_command))
     shown = results._repr_html_()
     assert "<td>proximity</td><td>5</td>" in shown

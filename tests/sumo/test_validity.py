@@ -255,6 +255,7 @@ def test_invalid_episodes_are_counted_apart() -> None:
     """They are in no rate."""
     tally = Tally()
     row = {"agent": "a", "run": 0, "trigger_time_s": "1.0", "violation_time_s": "", "breach": "x"}
+    row["time_s"] = "2.0"
     for outcome in ("held", "not_triggered", "invalid", "invalid"):
         tally.add(row | {"outcome": outcome})
     found = tally.all
@@ -262,6 +263,7 @@ def test_invalid_episodes_are_counted_apart() -> None:
     import pandas
 
     cells = {"outcome": ["held", "invalid"], "avoidable": math.nan, "reference": "", "blame": ""}
+    cells |= {"agent": "a", "run": 0, "time_s": 1.0, "trigger_time_s": 0.5}
     group: Any = SimpleNamespace(
         rows=pandas.DataFrame(cells),
         sequential=False,

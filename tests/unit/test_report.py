@@ -422,7 +422,9 @@ def test_moments_of_a_trace(tmp_path: Path) -> None:
         | {"testers": {}, "background": {}, "lights": ""}
         for i, (x, y) in enumerate(places)
     ]
-    head = {"format": "cavsumo-trace-1"}
+    row = {"run": "0", "seed": "1", "outcome": "not_triggered", "time_s": "0.200"}
+    head = {"format": "cavsumo-trace-1", "row": row, "plan": {}, "sha256": {}, "versions": {}}
+    head |= {"sumo_options": {}, "memory": None, "memory_kept": True, "bodies": []}
     file = tmp_path / "t.jsonl"
     file.write_text(trace_text(head, frames), encoding="utf-8")
     moments = read_moments(file, [0.1, 0.26, 0.0])

@@ -48,7 +48,7 @@ def seen(step: int, x: float = 1.0) -> dict[str, Any]:
 def played(run: int, *frames: dict[str, Any], **more: Any) -> Outcome:
     """The outcome of an episode, with a trace if there are frames."""
     mine = row(run, **more)
-    head = trace_head({"plan": {}}, mine, None, [snapshot(0)], Recorded(0, ()))
+    head = trace_head({"plan": {}, "sha256": {}, "versions": {}, "sumo_options": {}}, mine, None, [snapshot(0)], Recorded(0, ()))
     return Outcome(mine, trace_text(head, frames) if frames else "")
 
 
