@@ -48,7 +48,7 @@ class UnknownName(InputError):
     def __init__(self, what: str, name: str, valid: Iterable[str], where: str = "") -> None:
         self.name, self.valid = name, sorted(valid)
         place = f"{where}: " if where else ""
-        super().__init__(f"{place}unknown {what} {name!r}{_hint(name, self.valid)}")
+        super().__init__(f"{place}unknown {what} {shown(name)}{_hint(name, self.valid)}")
 
 
 class NetworkError(InputError):
@@ -99,6 +99,27 @@ class BatchError(CavsumoError):
 
 class ResultsError(InputError):
     """Results on disk are missing, foreign or damaged."""
+
+
+LONGEST = 500  # characters of a message; what is longer loses its middle
+SHOWN = 80  # characters of a value in a message
+
+
+def shown(value: object) -> str:
+    """A value as a message quotes it, not too long."""
+    try:
+        text = repr(value)
+    except (RecursionError, ValueError):  # nested, or with more digits than are printed
+        text = f"a {type(value).__name__}"
+    return text if len(text) <= SHOWN else text[:SHOWN] + "..."
+
+
+def sentence(error: BaseException) -> str:
+    """The message of an error as one line, without its middle when it is very long."""
+    text = " ".join(str(error).split())
+    if len(text) <= LONGEST:
+        return text
+    return f"{text[: LONGEST * 2 // 3]} ... {text[-LONGEST // 4 :]}"
 
 
 def _hint(name: str, valid: list[str]) -> str:

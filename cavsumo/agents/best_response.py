@@ -41,6 +41,7 @@ from cavsumo.agents.triggers import Timing, time_to_walk
 from cavsumo.agents.walking import ApproachKerb, CrossingWalk, walk
 from cavsumo.model.bodies import NOOP, Action, Kind
 from cavsumo.model.checks import choice, number, truth
+from cavsumo.model.documents import json_of, read_text
 from cavsumo.model.kinematics import wrap
 from cavsumo.model.scene import Scene
 from cavsumo.model.snapshot import BodyState, Snapshot
@@ -288,15 +289,14 @@ class PlannedBody:
 
 def load_counts(file: Path) -> Counts:
     """Counts from a JSON file or the manifest of a batch; ValueError when it has none."""
+    text = read_text(file, "model", ValueError)
     try:
-        data = json.loads(file.read_text(encoding="utf-8"))
+        data = json_of(text)
         if "learned" in data:
             data = learner_of(data["learned"], KNOWN)[0]
         return Counts.of(data["counts"])
-    except OSError as error:
-        raise ValueError(f"model {str(file)!r}: {error.strerror}") from error
-    except (ValueError, KeyError, TypeError, IndexError) as error:
+    except (ValueError, KeyError, TypeError, IndexError, AttributeError, OverflowError) as error:
         raise ValueError(
             f"model {str(file)!r}: expected the manifest of a batch with {KNOWN}, or a JSON object "
-            f"with its 'counts' ({error!r:.80})"
+            "with its 'counts'"
         ) from error

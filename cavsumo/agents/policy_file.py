@@ -49,6 +49,7 @@ from cavsumo.agents.observations import VERSION as OBSERVATION_VERSION
 from cavsumo.agents.observations import entries
 from cavsumo.errors import InputError
 from cavsumo.model.bodies import KINDS, WALKING
+from cavsumo.model.documents import first_problem, json_of
 
 LARGEST_B = 64 * 2**20  # far more than a policy needs; a larger archive is refused
 Array = NDArray[np.float64]
@@ -166,9 +167,7 @@ def read_policy(file: Path) -> TrainedPolicy:
     except OSError as error:
         raise InputError(f"{where}: {error.strerror or error}") from error
     except ValidationError as error:
-        first = error.errors()[0]
-        key = ".".join(map(str, first["loc"])) or "header"
-        raise InputError(f"{where}: {key}: {first['msg']}, got {first['input']!r:.60}") from error
+        raise InputError(f"{where}: header: {first_problem(error)}") from error
     except ValueError as error:
         raise InputError(f"{where}: {' '.join(str(error).split())}") from error
 
@@ -196,7 +195,7 @@ def _arrays(content: bytes) -> dict[str, NDArray[Any]]:
         with np.load(io.BytesIO(content), allow_pickle=False) as archive:
             return {name: archive[name] for name in archive.files}
     except Exception as error:  # numpy and zipfile raise all sorts of things over foreign files
-        raise ValueError(f"no .npz archive of plain arrays ({error})") from error
+        raise ValueError("no .npz archive of plain arrays") from error
 
 
 def _assembled(arrays: Mapping[str, NDArray[Any]]) -> TrainedPolicy:
@@ -204,9 +203,10 @@ def _assembled(arrays: Mapping[str, NDArray[Any]]) -> TrainedPolicy:
     if "header" not in arrays or arrays["header"].dtype.kind != "U":
         raise ValueError("no policy: it has no header")
     try:
-        header = Header.model_validate(json.loads(str(arrays["header"])))
-    except json.JSONDecodeError as error:
+        document = json_of(str(arrays["header"]))
+    except ValueError as error:
         raise ValueError(f"its header is no JSON ({error})") from error
+    header = Header.model_validate(document)
     depth = sum(name.startswith("weights") for name in arrays)
     layers = [f"{name}{i}" for i in range(depth) for name in ("weights", "biases")]
     wanted = ["mean", "scale", *layers, *(["table"] if header.actions == "table" else [])]

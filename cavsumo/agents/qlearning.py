@@ -11,8 +11,6 @@ ends are not bootstrapped; the horizon is, because only the simulation ends ther
 
 from __future__ import annotations
 
-import json
-import math
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, ClassVar
@@ -24,6 +22,7 @@ from cavsumo.agents.features import FEATURES, TARGETS, Features, towards
 from cavsumo.agents.staying import Staying
 from cavsumo.model.bodies import Action
 from cavsumo.model.checks import number, truth
+from cavsumo.model.documents import json_of, read_text
 from cavsumo.model.scene import Scene
 from cavsumo.model.snapshot import Snapshot
 
@@ -160,18 +159,15 @@ def total(values: Iterable[float]) -> float:
 
 def load_weights(file: Path) -> list[float]:
     """Weights from a JSON file with a number for each feature; ValueError when it is none."""
+    text = read_text(file, "weights", ValueError)
     try:
-        data = json.loads(file.read_text(encoding="utf-8"))
+        data = json_of(text)
         if "learned" in data:  # the manifest of a batch
             data = learner_of(data["learned"], "q-learning")[0]
         weights = [number(name, data["weights"][name]) for name in FEATURES]
-    except OSError as error:
-        raise ValueError(f"weights {str(file)!r}: {error.strerror}") from error
-    except (json.JSONDecodeError, KeyError, TypeError, IndexError) as error:
+    except (ValueError, KeyError, TypeError, IndexError, AttributeError) as error:
         raise ValueError(
-            f"weights {str(file)!r}: expected a JSON object with 'weights' for the features "
-            f"{', '.join(FEATURES)} ({error})"
+            f"weights {str(file)!r}: expected a JSON object with 'weights', finite numbers for the "
+            f"features {', '.join(FEATURES)}"
         ) from error
-    if not all(math.isfinite(w) for w in weights):
-        raise ValueError(f"weights {str(file)!r}: every weight must be finite")
     return weights

@@ -18,7 +18,7 @@ from cavsumo.batch.tally import Tally
 from cavsumo.egos.ego_files import OutputWatch
 from cavsumo.errors import BatchError
 from cavsumo.model.scenario import BatchPlan
-from cavsumo.results.reading import COMPLETE, rows_of
+from cavsumo.results.reading import COMPLETE, check_cells, rows_of
 from cavsumo.results.rows import Outcome
 from cavsumo.results.writing import Recorder
 
@@ -66,6 +66,7 @@ class BatchRun:
         self._todo = self.prepared.plan.todo()
         self._knowledge = Knowledge(self.prepared, manifest)
         for row in self.recorder.resume(manifest, self._todo):
+            check_cells(self.recorder.csv_file, row)
             self.tally.add(row)
             self._knowledge.seen(row)
         self._knowledge.catch_up(self.executor)

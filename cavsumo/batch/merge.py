@@ -12,9 +12,10 @@ from cavsumo.batch.preflight import check_kept
 from cavsumo.batch.prepared import OUTPUTS
 from cavsumo.batch.tally import Tally
 from cavsumo.errors import InputError, ResultsError
+from cavsumo.model.documents import read_text
 from cavsumo.results.present import input_files, present_paths
 from cavsumo.results.provenance import differences
-from cavsumo.results.reading import check_apart, ego_log_name, inside, whole_lines
+from cavsumo.results.reading import check_apart, check_cells, ego_log_name, inside, whole_lines
 from cavsumo.results.recorded_plan import recorded_plan
 from cavsumo.results.rows import Outcome
 from cavsumo.results.writing import Recorder
@@ -130,6 +131,7 @@ def _numbered(part: Path, index: int) -> Iterator[Numbered]:
     for _, row in whole_lines(part):
         if row is not None:
             run = int(row["run"])
+            check_cells(part, row)
             if run <= last:
                 raise ResultsError(f"results {str(part)!r}: run {run} stands behind run {last}")
             last = run
@@ -140,16 +142,12 @@ def _trace_of(part: Path, row: dict[str, str]) -> str:
     """The trace of a row, empty for none."""
     if not row["trace"]:
         return ""
-    try:
-        return inside(part, row["trace"]).read_text(encoding="utf-8")
-    except (OSError, UnicodeDecodeError) as error:
-        raise ResultsError(f"results {str(part)!r}: trace of run {row['run']}: {error}") from error
+    what = f"results {str(part)!r}: trace of run {row['run']}"
+    return read_text(inside(part, row["trace"]), what, ResultsError)
 
 
 def _log_of(part: Path, run: int) -> str:
     """The ego's output in an episode, empty for none."""
     file = inside(part, ego_log_name(part, run))
-    try:
-        return file.read_text(encoding="utf-8") if file.exists() else ""
-    except (OSError, UnicodeDecodeError) as error:
-        raise ResultsError(f"results {str(part)!r}: {file.name}: {error}") from error
+    what = f"results {str(part)!r}: ego's output in run {run}"
+    return read_text(file, what, ResultsError) if file.exists() else ""

@@ -14,12 +14,12 @@ from cavsumo.batch.messages import Answer
 from cavsumo.batch.prepared import PreparedBatch, prepare
 from cavsumo.batch.trust import check_trust
 from cavsumo.batch.worker import Worker, search
-from cavsumo.errors import DivergenceError, ResultsError
+from cavsumo.errors import DivergenceError, ResultsError, shown
 from cavsumo.model.bodies import STEERING, THROTTLE
 from cavsumo.model.scenario import BatchPlan
 from cavsumo.results.columns import COLUMNS, Row
-from cavsumo.results.reading import inside, rows_of
-from cavsumo.results.recorded_plan import recorded_plan
+from cavsumo.results.reading import check_cells, inside, rows_of
+from cavsumo.results.recorded_plan import plan_in, recorded_plan
 from cavsumo.results.rows import cell
 from cavsumo.results.traces import NOT_REPLAYED, Trace, parsed, read_trace
 
@@ -92,6 +92,7 @@ def recorded_row(csv_file: Path, run: int) -> dict[str, str]:
     rows = {row.get("run"): row for row in rows_of(csv_file, filled=False)}
     if str(run) not in rows:
         raise ResultsError(f"results {str(csv_file)!r}: no run {run} among {len(rows)} rows")
+    check_cells(csv_file, rows[str(run)])
     return rows[str(run)]
 
 
@@ -104,15 +105,10 @@ def recorded_alone(
     """
     trace, name = read_trace(file), f"trace {str(file)!r}"
     head = trace.head
-    try:
-        plan = BatchPlan.model_validate(head["plan"])
-        row = trace.row
-        int(row["run"]), int(row["seed"]), trace.shapes(), dict(head["sha256"])
-        plan.agents.index(row["agent"])
-        kept, shared = head["memory_kept"], row["reset"] == "shared"
-    except (KeyError, ValueError, TypeError) as error:
-        raise ResultsError(f"{name}: its head holds no valid plan, row and bodies") from error
-    if shared:
+    plan, row, kept = plan_in(head, name), trace.row, head["memory_kept"]
+    if row["agent"] not in plan.cast:
+        raise ResultsError(f"{name}: its plan has no agent {shown(row['agent'])}")
+    if row["reset"] == "shared":
         raise ResultsError(
             f"{name}: was played in a simulation that other episodes used before; replay it from "
             "its results"

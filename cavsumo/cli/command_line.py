@@ -3,13 +3,23 @@
 from __future__ import annotations
 
 import argparse
+import os
 import sys
 from collections.abc import Callable, Collection, Sequence
 from typing import Any, NoReturn
 
 from cavsumo import __version__
 from cavsumo.cli.options import adders
-from cavsumo.errors import BatchError, CavsumoError, DivergenceError, Exit, InputError, UnknownName
+from cavsumo.errors import (
+    BatchError,
+    CavsumoError,
+    DivergenceError,
+    Exit,
+    InputError,
+    UnknownName,
+    sentence,
+    shown,
+)
 
 HYPHENATED = ("--bbox", "--ego-route", "--junction")  # options whose values may begin with "-"
 
@@ -28,15 +38,24 @@ def main(argv: Sequence[str] | None = None) -> int:
         status: int = options.command(options)
         return status
     except DivergenceError as error:
-        print(f"cavsumo: {error}", file=sys.stderr)
-        return Exit.VIOLATED
+        return _refused(error, Exit.VIOLATED)
     except CavsumoError as error:
-        print(f"cavsumo: {error}", file=sys.stderr)
-        return Exit.NOT_RUN if isinstance(error, BatchError) else Exit.USAGE
+        return _refused(error, Exit.NOT_RUN if isinstance(error, BatchError) else Exit.USAGE)
     except BrokenPipeError:
         return Exit.OK
+    except OSError as error:  # a path that the system does not take: too long, not readable
+        if error.filename is None:
+            raise
+        path = shown(os.fspath(error.filename))
+        return _refused(InputError(f"{path}: {error.strerror}"), Exit.USAGE)
     except KeyboardInterrupt:
         return Exit.INTERRUPTED
+
+
+def _refused(error: CavsumoError, status: Exit) -> int:
+    """Say why it ends, in one sentence."""
+    print(f"cavsumo: {sentence(error)}", file=sys.stderr)
+    return status
 
 
 def _joined(words: Sequence[str]) -> list[str]:

@@ -7,6 +7,7 @@ floats (``Game.exact``), so that small games can be checked without rounding.
 
 from __future__ import annotations
 
+import re
 from collections import deque
 from collections.abc import Callable, Collection, Hashable, Iterable, Mapping, Sequence
 from fractions import Fraction
@@ -14,6 +15,7 @@ from typing import Any
 
 import numpy as np
 
+from cavsumo.errors import shown
 from cavsumo.games.model import SUM_TOLERANCE, Bools, Exact, Floats, Game, GameError, Ints, check
 
 Number = int | float | Fraction | str
@@ -151,15 +153,29 @@ def _merged(
 def _rational(place: str, what: str, value: Any) -> Fraction:
     """A number as a rational; strings may hold "1/3"."""
     try:
-        if isinstance(value, bool):
-            raise TypeError
+        return rational(value)
+    except ValueError:
+        raise GameError(
+            f'{place}: expected a {what} such as 0.25 or "1/4", got {shown(value)}'
+        ) from None
+
+
+def rational(value: Any) -> Fraction:
+    """A number, or a string such as "0.25" or "1/4", exactly; ValueError for what no float holds.
+
+    Exponents are looked at before: the digits of 1e999999999 would fill the memory.
+    """
+    if isinstance(value, bool) or (isinstance(value, str) and _LARGE_EXPONENT.search(value)):
+        raise ValueError(f"{shown(value)} is no number")
+    try:
         number = Fraction(value)
         float(number)  # too large: OverflowError
-        return number
     except (TypeError, ValueError, ZeroDivisionError, OverflowError):
-        raise GameError(
-            f'{place}: expected a {what} such as 0.25 or "1/4", got {value!r}'
-        ) from None
+        raise ValueError(f"{shown(value)} is no number") from None
+    return number
+
+
+_LARGE_EXPONENT = re.compile(r"[eE][+-]?0*[1-9]\d{3}")
 
 
 def _from_table(

@@ -10,13 +10,12 @@ Keys that are not named here are ignored.
 from __future__ import annotations
 
 import json
-from fractions import Fraction
 from pathlib import Path
 from typing import Any
 
-from cavsumo.errors import InputError
-from cavsumo.games.build import from_transitions
+from cavsumo.games.build import from_transitions, rational
 from cavsumo.games.model import Game, GameError
+from cavsumo.model.documents import json_of, read_text
 
 KEYS = ("n_states", "goal", "initial", "transitions")
 SHAPE = "[state, tester action, ego action, [[next, probability, reward], ...]]"
@@ -28,14 +27,11 @@ def read_game(file: Path) -> Game:
     Raises:
         InputError: there is none; one sentence with file, key or state, and what was expected.
     """
+    text = read_text(file, "game")
     try:
-        case = json.loads(
-            file.read_text(encoding="utf-8"), parse_float=Fraction, parse_constant=_no_number
-        )
-    except OSError as error:
-        raise InputError(f"game {str(file)!r}: {error.strerror}") from error
-    except (ValueError, RecursionError) as error:  # also what is no UTF-8
-        raise InputError(f"game {str(file)!r}: no JSON: {error}") from error
+        case = json_of(text, parse_float=rational)
+    except ValueError as error:
+        raise GameError(f"game {str(file)!r}: {error}") from error
     try:
         return game_of(case)
     except GameError as error:
@@ -61,10 +57,6 @@ def game_of(case: Any) -> Game:
         initial=_whole("initial", case["initial"]),
         name=str(case.get("id", "")),
     )
-
-
-def _no_number(word: str) -> None:
-    raise ValueError(f"{word} is no number")
 
 
 def _whole(key: str, value: Any) -> int:

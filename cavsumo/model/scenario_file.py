@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import tomllib
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 from cavsumo.errors import InputError
+from cavsumo.model.documents import LARGEST_TOML_B, read_text, toml_of
 from cavsumo.model.labels import labelled
 from cavsumo.model.named_networks import is_named, is_word
 from cavsumo.model.scenario import check_keys
@@ -26,11 +26,10 @@ def read_config(file: Path) -> dict[str, Any]:
 
 def read_toml(file: Path) -> dict[str, Any]:
     """The content of a scenario file, unchecked."""
+    text = read_text(file, "config", largest=LARGEST_TOML_B)
     try:
-        return tomllib.loads(file.read_text(encoding="utf-8"))
-    except OSError as error:
-        raise InputError(f"config {str(file)!r}: {error.strerror}") from error
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        return toml_of(text)
+    except ValueError as error:
         raise InputError(f"config {str(file)!r}: {error}") from error
 
 

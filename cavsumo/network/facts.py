@@ -62,7 +62,7 @@ def facts(network: Network) -> Facts:
     neighbours = _neighbours(network)
     ends = sum(len(others) < 2 for others in neighbours.values())
     rights = Counter(right_of_way(crossing) for crossing in network.crossings())
-    west, south, east, north = network.net.getBoundary()
+    west, south, east, north = _boundary(network)
     found = Facts(
         format=network.root.get("version", ""),
         left_hand=network.left_hand,
@@ -109,6 +109,14 @@ def place(network: Network, x: float, y: float) -> tuple[float, float] | None:
 def has_georeference(network: Network) -> bool:
     """Whether a network has a georeference."""
     return str(network.net._location.get("projParameter", "!")) not in ("!", "-", "", ".")
+
+
+def _boundary(network: Network) -> tuple[float, float, float, float]:
+    """West, south, east and north end [m]: as the file says, else of its junctions."""
+    if "convBoundary" in network.net._location:
+        return tuple(network.net.getBoundary())
+    (west, south), (east, north) = network.net.getBBoxXY()
+    return west, south, east, north
 
 
 def _neighbours(network: Network) -> dict[str, set[str]]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import gzip
 import zlib
 from pathlib import Path
+from typing import IO, cast
 from xml.etree import ElementTree
 
 from cavsumo.errors import NetworkError
@@ -19,17 +20,34 @@ def root_of(file: Path) -> dict[str, str]:
         raise NetworkError(f"network {str(file)!r}: is a folder, expected a .net.xml")
     if not file.is_file():
         raise NetworkError(f"network {str(file)!r}: no such file{_neighbours(file)}")
-    opener = gzip.open if file.suffix == ".gz" else open
     try:
-        with opener(file, "rb") as stream:
+        with opened(file) as stream:
             _, root = next(ElementTree.iterparse(stream, events=("start",)))
-    except (ElementTree.ParseError, OSError, EOFError, zlib.error) as error:
+    except (EOFError, zlib.error, gzip.BadGzipFile) as error:
+        raise NetworkError(f"network {str(file)!r}: not well-formed XML: a damaged .gz") from error
+    except OSError as error:
+        said = error.strerror or error
+        raise NetworkError(f"network {str(file)!r}: cannot be read: {said}") from error
+    except ElementTree.ParseError as error:
         raise NetworkError(f"network {str(file)!r}: not well-formed XML: {error}") from error
+    except (LookupError, ValueError) as error:
+        raise NetworkError(
+            f"network {str(file)!r}: not well-formed XML: its encoding cannot be read, expected "
+            "UTF-8"
+        ) from error
     if root.tag != "net":
         raise NetworkError(
-            f"network {str(file)!r}: a SUMO network begins with <net>, this file with <{root.tag}>"
+            f"network {str(file)!r}: a SUMO network begins with <net>, this file with "
+            f"<{root.tag[:40]}>"
         )
     return dict(root.attrib)
+
+
+def opened(file: Path) -> IO[bytes]:
+    """The content of a file, packed with gzip or not."""
+    with file.open("rb") as raw:
+        packed = raw.read(2) == b"\x1f\x8b"
+    return cast("IO[bytes]", gzip.open(file)) if packed else file.open("rb")
 
 
 def _neighbours(file: Path) -> str:

@@ -7,19 +7,17 @@ no side of the road is taken for granted.
 from __future__ import annotations
 
 import html
-import xml.sax
-import zlib
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path as FilePath
 from typing import Any
 
 import shapely
-import sumolib
 from shapely.geometry import LineString, Polygon
 
 from cavsumo.errors import NetworkError, UnknownName
 from cavsumo.model.carriageway import Roads
 from cavsumo.model.polyline import Path, Point
+from cavsumo.network.net_file import read_net
 from cavsumo.network.network_file import root_of
 
 # Junction interiors leave slivers between the lanes that cross them; closing by this much [m]
@@ -139,23 +137,8 @@ def read_network(file: FilePath, *, foes: bool = False) -> Network:
 
     ``foes``: with the tables of right of way, which take long on large networks.
     """
-    root = root_of(file)
-    try:
-        net = sumolib.net.readNet(
-            str(file),
-            withInternal=True,
-            withPedestrianConnections=True,
-            withPrograms=True,
-            withFoes=foes,
-            lxml=False,
-        )
-    except (xml.sax.SAXParseException, EOFError, zlib.error) as error:
-        raise NetworkError(
-            f"network {str(file)!r}: not well-formed XML: {_one_line(error)}"
-        ) from error
-    except (xml.sax.SAXException, LookupError, ValueError, TypeError, AttributeError, OSError) as e:
-        raise NetworkError(f"network {str(file)!r}: cannot be read: {_one_line(e)}") from e
-    network = Network(file, net, root)
+    root_of(file)
+    network = Network(file, *read_net(file, foes=foes))
     if not any(driving_lanes(edge) for edge in network.edges):
         raise NetworkError(f"network {str(file)!r}: holds no lane on which a car may drive")
     return network
@@ -231,8 +214,3 @@ def interior(network: Network, link: Any) -> list[Any]:
         onward = via.getOutgoing()
         link = onward[0] if onward else None
     return lanes
-
-
-def _one_line(error: BaseException) -> str:
-    """An exception as one line."""
-    return " ".join(f"{type(error).__name__}: {error}".split())

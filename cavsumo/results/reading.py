@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import csv
-import json
-from collections.abc import Iterator, Sequence
+import re
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path, PureWindowsPath
 from typing import TYPE_CHECKING, Any
 
-from cavsumo.errors import ResultsError
+from cavsumo.errors import ResultsError, shown
+from cavsumo.model.documents import json_of, read_text
 from cavsumo.results.columns import COLUMNS
+from cavsumo.results.schema import check_manifest, check_row
 
 if TYPE_CHECKING:
     import pandas
@@ -51,12 +53,17 @@ def inside(csv_file: Path, name: str) -> Path:
 def read_manifest(csv_file: Path) -> dict[str, Any]:
     """The manifest that belongs to a results file."""
     file = csv_file.with_suffix(".json")
+    text = read_text(file, "manifest", ResultsError)
     try:
-        data = json.loads(file.read_text(encoding="utf-8"))
-    except (OSError, ValueError) as error:
+        data = json_of(text)
+    except ValueError as error:
         raise ResultsError(f"manifest {str(file)!r}: cannot be read: {error}") from error
     if not isinstance(data, dict) or data.get("format") != FORMAT:
         raise ResultsError(f"manifest {str(file)!r}: is not of the format {FORMAT}")
+    try:
+        check_manifest(data)
+    except ValueError as error:
+        raise ResultsError(f"manifest {str(file)!r}: {error}") from error
     return data
 
 
@@ -97,15 +104,21 @@ def rows_of(csv_file: Path, *, filled: bool = True) -> Iterator[dict[str, str]]:
     """
     try:
         with csv_file.open(encoding="utf-8", newline="") as stream:
-            reader = csv.DictReader(stream)
+            reader = csv.DictReader(stream, restval="")
             missing = [column for column in COLUMNS if column not in (reader.fieldnames or ())]
             for column in missing:
                 if column in FIRST:
                     raise ResultsError(f"results {str(csv_file)!r}: no column {column!r}")
             added = dict.fromkeys(missing, "") if filled else {}
             yield from (row | added for row in reader)
-    except (OSError, UnicodeDecodeError, csv.Error) as error:
-        raise ResultsError(f"results {str(csv_file)!r}: cannot be read: {error}") from error
+    except OSError as error:
+        raise ResultsError(
+            f"results {str(csv_file)!r}: cannot be read: {error.strerror}"
+        ) from error
+    except (UnicodeDecodeError, csv.Error) as error:
+        raise ResultsError(
+            f"results {str(csv_file)!r}: line {reader.line_num + 1} is damaged"
+        ) from error
 
 
 def whole_lines(csv_file: Path) -> Iterator[tuple[bytes, dict[str, str] | None]]:
@@ -142,9 +155,18 @@ def _parsed(line: bytes, columns: Sequence[str], place: str) -> dict[str, str]:
     if len(cells) != len(columns):
         raise ResultsError(f"{place} has {len(cells)} cells, expected {len(columns)}")
     row = dict.fromkeys(COLUMNS, "") | dict(zip(columns, cells, strict=True))
-    if not row["run"].isdecimal():
-        raise ResultsError(f"{place} begins with {row['run']!r}, expected the number of a run")
+    if not re.fullmatch(r"[0-9]{1,9}", row["run"]):
+        raise ResultsError(f"{place} begins with {shown(row['run'])}, expected the number of a run")
     return row
+
+
+def check_cells(csv_file: Path, row: Mapping[str, str]) -> None:
+    """Raise ResultsError unless what is computed from a row of a results file can be."""
+    try:
+        check_row(row)
+    except ValueError as error:
+        place = f"results {str(csv_file)!r}: run {shown(row.get('run') or '')}"
+        raise ResultsError(f"{place}: {error}") from error
 
 
 def read_results(csv_file: Path) -> pandas.DataFrame:

@@ -12,14 +12,15 @@ import itertools
 import json
 import math
 import re
-from collections.abc import Iterable, Iterator, Mapping, Sequence, Set
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, NamedTuple
 
 from cavsumo.agents.recorded import Recorded
-from cavsumo.errors import ResultsError
+from cavsumo.errors import ResultsError, shown
 from cavsumo.model.bodies import Action, Body
+from cavsumo.model.documents import json_of, read_text
 from cavsumo.model.scenario import BatchPlan
 from cavsumo.model.snapshot import BodyState, Snapshot
 from cavsumo.network.site import Site
@@ -27,11 +28,11 @@ from cavsumo.results.columns import COLUMNS, Row
 from cavsumo.results.provenance import EXTENT, traffic_checksum, versions
 from cavsumo.results.recording import recording, recording_head
 from cavsumo.results.rows import cell
+from cavsumo.results.schema import check_frame, check_head, check_row
 from cavsumo.sumo.options import OPTIONS
 
 FORMAT = "cavsumo-trace-2"
 FORMATS = ("cavsumo-trace-1", FORMAT)  # the first has neither starts, actions nor departures
-FRAME_KEYS = {"step", "time_s", "ego", "steering", "testers", "background"}
 # Columns that a replay does not reproduce: real time, and the file beside the row.
 NOT_REPLAYED = ("wall_s", "trace")
 # Settings that say how a batch is played and kept and not what its episodes are; what is known is
@@ -72,8 +73,12 @@ class Trace:
 
     @property
     def row(self) -> dict[str, str]:
-        """The row of the episode as text, without the columns that a replay does not reproduce."""
-        return dict(self.head["row"])
+        """The row of the episode as text, without the columns that a replay does not reproduce.
+
+        A column that its writer did not know is empty.
+        """
+        row: dict[str, str] = self.head["row"]
+        return {c: "" for c in COLUMNS if c not in NOT_REPLAYED} | row
 
     def shapes(self) -> dict[str, Shape]:
         """The boxes of all bodies by their ids."""
@@ -172,13 +177,12 @@ def trace_text(head: Mapping[str, Any], frames: Iterable[Mapping[str, Any]]) -> 
 
 def read_trace(file: Path) -> Trace:
     """The trace in a file; raises ResultsError in one sentence."""
+    text = read_text(file, "trace", ResultsError)
     try:
-        return parsed(file.read_text(encoding="utf-8"))
+        return parsed(text)
     except UnknownFormat as error:
         raise ResultsError(f"trace {str(file)!r}: {error}") from error
-    except OSError as error:
-        raise ResultsError(f"trace {str(file)!r}: cannot be read: {error.strerror}") from error
-    except (ValueError, TypeError, AttributeError) as error:
+    except ValueError as error:
         raise ResultsError(f"trace {str(file)!r}: cannot be read: {error}") from error
 
 
@@ -187,21 +191,41 @@ class UnknownFormat(ValueError):
 
 
 def parsed(text: str) -> Trace:
-    """The trace in a text; raises ValueError and the like for invalid text."""
-    first, *lines = text.splitlines() or [""]
+    """The trace in a text; raises ValueError, in plain words, for invalid text."""
+    first, *lines = _lines(text)
     head = _head(first)
-    keys = FRAME_KEYS if head["format"] == FORMATS[0] else FRAME_KEYS | {"actions"}
-    return Trace(head, [_frame(line, keys) for line in lines])
+    acted = head["format"] != FORMATS[0]
+    trace = Trace(head, [_frame(line, i, acted=acted) for i, line in enumerate(lines, 2)])
+    met = trace.shapes()
+    for i, found in enumerate(trace.frames, 2):
+        for _, name, _ in states(found):
+            if name not in met:
+                raise ValueError(f"line {i}: the head tells no shape of {shown(name)}")
+    return trace
+
+
+def _lines(text: str) -> list[str]:
+    """The lines of a text: those that end with a line feed, and the rest behind the last."""
+    lines = text.split("\n")
+    return lines if lines[-1] or len(lines) == 1 else lines[:-1]
 
 
 def _head(line: str) -> dict[str, Any]:
     """The first line of a trace; raises UnknownFormat for a format that is not read."""
-    found = json.loads(line)
+    try:
+        found = json_of(line)
+    except ValueError as error:
+        raise ValueError(f"line 1: {error}") from error
     if not (isinstance(found, dict) and isinstance(found.get("format"), str)):
         raise ValueError("line 1 is not the head of a trace")
     if found["format"] not in FORMATS:
         said, known = " ".join(found["format"].split())[:40], " and ".join(FORMATS)
         raise UnknownFormat(f"format {said}, this version reads {known}")
+    try:
+        check_head(found)
+        check_row(found["row"])
+    except ValueError as error:
+        raise ValueError(f"line 1: {error}") from error
     return found
 
 
@@ -211,17 +235,18 @@ def read_moments(file: Path, times: Sequence[float]) -> list[tuple[float, dict[s
     Only those frames are parsed completely, because traces are long and a report reads thousands.
     """
     try:
-        with file.open(encoding="utf-8") as stream:
-            first, *lines = stream.readlines() or [""]
-        _head(first)
+        first, *lines = _lines(read_text(file, "trace", ResultsError))
+        acted = _head(first)["format"] != FORMATS[0]
+        if not lines:
+            raise ValueError("no frames")
         passing = list(map(_passing, lines))
         steps = (math.dist(a[1:], b[1:]) for a, b in itertools.pairwise(passing))
         driven = list(itertools.accumulate(steps, initial=0.0))
         nearest = [min(range(len(lines)), key=lambda i: abs(passing[i][0] - t)) for t in times]
-        return [(driven[i], _frame(lines[i])) for i in nearest]
+        return [(driven[i], _frame(lines[i], i + 2, acted=acted)) for i in nearest]
     except UnknownFormat as error:
         raise ResultsError(f"trace {str(file)!r}: {error}") from error
-    except (OSError, ValueError, TypeError) as error:
+    except ValueError as error:
         raise ResultsError(f"trace {str(file)!r}: cannot be read: {error}") from error
 
 
@@ -233,25 +258,20 @@ def _passing(line: str) -> tuple[float, float, float]:
     found = _POSE.search(line)
     if found is None:
         raise ValueError("a frame without time_s and ego, one after the other")
-    time, x, y = map(float, found.groups())
+    try:
+        time, x, y = map(float, found.groups())
+    except ValueError:
+        time = x = y = math.nan
+    if not math.isfinite(time + x + y):
+        raise ValueError(f"a frame at {shown(found.groups())}, expected numbers")
     return time, x, y
 
 
-def _frame(line: str, keys: Set[str] = FRAME_KEYS) -> dict[str, Any]:
-    """A line of a trace, which has at least some keys."""
-    found: dict[str, Any] = json.loads(line)
-    if not found.keys() >= keys:
-        raise ValueError(f"a frame without {', '.join(sorted(keys - found.keys()))}")
-    for _, name, state in states(found):
-        if not _numbers(state, 4):
-            raise ValueError(f"step {found['step']}: {name} is {state!r}, expected [x, y, v, o]")
-    for action in found["actions"] if "actions" in keys else ():
-        if not _numbers(action, 2):
-            said = f"action {action!r}, expected [throttle, steering]"
-            raise ValueError(f"step {found['step']}: {said}")
+def _frame(line: str, number: int, *, acted: bool) -> dict[str, Any]:
+    """A line of a trace, whose number is for messages; ``acted``: it has to hold actions."""
+    try:
+        found: dict[str, Any] = json_of(line, bounded=False)
+        check_frame(found, acted=acted)
+    except ValueError as error:
+        raise ValueError(f"line {number}: {error}") from error
     return found
-
-
-def _numbers(found: Any, count: int) -> bool:
-    """Whether something is so many numbers."""
-    return len(found) == count and all(isinstance(value, int | float) for value in found)

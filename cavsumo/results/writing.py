@@ -2,13 +2,16 @@
 
 The results file is locked while a batch writes it. Every row is one write, after its trace (and the
 ego's output), and the manifest is replaced atomically. A process that is killed leaves at most one
-torn row at the end, which ``resume`` takes off again; a full disk leaves none.
+torn row at the end, which ``resume`` takes off again; a full disk leaves none. A file that another
+process removes, cuts or changes meanwhile is noticed before the next row: then nothing more is
+written.
 """
 
 from __future__ import annotations
 
 import errno
 import fcntl
+import hashlib
 import json
 import os
 from collections.abc import Iterator, Mapping
@@ -56,6 +59,8 @@ class Recorder:
         self.traces = 0
         self.manifest: dict[str, Any] = {}
         self._begun = False
+        self._size, self._last = 0, -1  # bytes of whole rows; the last episode among them
+        self._sum, self._changed = hashlib.sha256(), 0  # of these bytes, and when written [ns]
 
     def __enter__(self) -> Recorder:
         self._created = not self.csv_file.exists()
@@ -120,24 +125,26 @@ class Recorder:
                 f"results {str(self.csv_file)!r}: cannot be written: {error.strerror}"
             ) from error
 
-    _size, _last = 0, -1  # bytes of whole rows; the last episode among them
     _has_folder = False  # whether there may be files beside the rows
 
     def write(self, outcome: Outcome) -> Row:
         """Append a row, its trace first; raises BatchError when the disk takes no more."""
+        self._check_own()
         row = self._with_trace(outcome)
         line = _line(row)
         try:
             _write_all(self._file, line)
         except OSError as error:
             self._file.truncate(self._size)
+            self._note(b"")
             raise self._no_more(error) from error
-        self._size += len(line)
+        self._note(line)
         self._last = row["run"]
         return row
 
     def replace(self, outcomes: Mapping[int, Outcome]) -> None:
         """Replace some rows, all at once or not at all."""
+        self._check_own()
         rows = {run: self._with_trace(outcome) for run, outcome in outcomes.items()}
         new_file = self.csv_file.with_name(f".{self.csv_file.name}.new")
         new_file.unlink(missing_ok=True)
@@ -157,10 +164,12 @@ class Recorder:
             raise self._no_more(error) from error
         self._file.close()
         self._file = new
-        self._size = self.csv_file.stat().st_size
+        self._size, self._sum = 0, hashlib.sha256()
+        self._note(self.csv_file.read_bytes())
 
     def checkpoint(self, facts: Mapping[str, Any]) -> None:
         """Record facts in the manifest of the running batch."""
+        self._check_own()
         self.manifest.update(facts)
         try:
             self._write_manifest(RUNNING)
@@ -169,6 +178,7 @@ class Recorder:
 
     def finish(self, status: str, facts: Mapping[str, Any]) -> None:
         """Make the rows durable and complete the manifest."""
+        self._check_own()
         self.manifest.update(facts)
         try:
             os.fsync(self._file.fileno())
@@ -219,15 +229,45 @@ class Recorder:
                 self._last = int(row["run"])
                 self.traces += bool(row["trace"])
                 yield row
-            self._size += len(line)
+            self._note(line)
 
     def _start_rows(self) -> None:
         """Be ready for the next row, the header before the first."""
         self._has_folder = self.trace_folder.is_dir()
         if not self._size:
             _write_all(self._file, HEADER.encode("utf-8"))
-            self._size = len(HEADER.encode("utf-8"))
+            self._note(HEADER.encode("utf-8"))
+        self._changed = os.fstat(self._file.fileno()).st_mtime_ns
         self._write_manifest(RUNNING)
+
+    def _note(self, data: bytes) -> None:
+        """Note bytes that this process has appended to the file."""
+        self._size += len(data)
+        self._sum.update(data)
+        self._changed = os.fstat(self._file.fileno()).st_mtime_ns
+
+    def _check_own(self) -> None:
+        """Raise BatchError unless the results file is there, and as we wrote it."""
+        ours = os.fstat(self._file.fileno())
+        try:
+            there = self.csv_file.stat()
+        except OSError:
+            raise self._interfered("was removed") from None
+        if not os.path.samestat(ours, there):
+            raise self._interfered("was replaced by another file")
+        if there.st_size != self._size:
+            raise self._interfered(f"has {there.st_size} bytes where {self._size} were written")
+        if there.st_mtime_ns != self._changed:
+            if hashlib.sha256(self.csv_file.read_bytes()).digest() != self._sum.digest():
+                raise self._interfered("was changed")
+            self._changed = there.st_mtime_ns
+
+    def _interfered(self, what: str) -> BatchError:
+        """The error for results that another process has changed."""
+        return BatchError(
+            f"results {str(self.csv_file)!r}: the file {what} while the batch was written; nothing "
+            "more is written"
+        )
 
     def _remove_traces(self, after: int) -> None:
         """Remove the traces and logs of later episodes, and nothing else."""

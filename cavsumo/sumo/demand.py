@@ -24,11 +24,16 @@ LASTING = ("vType", "vTypeDistribution", "route", "routeDistribution")
 
 
 def types_only(route_file: Path) -> str:
-    """The vehicle types and named routes of a route file, as an additional file."""
+    """The vehicle types and named routes of a route file, as an additional file.
+
+    Raises InputError for what is no XML.
+    """
     kept = ElementTree.Element("additional")
-    for element in ElementTree.parse(route_file).getroot():
-        if element.tag in LASTING:
-            kept.append(element)
+    try:
+        root = ElementTree.parse(route_file).getroot()
+    except (ElementTree.ParseError, LookupError, ValueError) as error:
+        raise InputError(f"routes {str(route_file)!r}: not well-formed XML") from error
+    kept.extend(element for element in root if element.tag in LASTING)
     return ElementTree.tostring(kept, encoding="unicode")
 
 

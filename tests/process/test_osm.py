@@ -272,7 +272,11 @@ FOOTWAY = CROSSROADS.read_bytes().replace(b"primary", b"footway").replace(b"resi
         ("a.osm.gz", gzip.compress(CROSSROADS.read_bytes())[:300], "not well-formed XML"),
         ("a.osm", b"<html><body/></html>", "begins with <osm>, this file with <html>"),
         ("a.osm", NO_ROADS, "holds no roads"),
-        ("a.osm", NO_ROADS.replace(b'lat="1"', b'lat="north"'), "without id or place"),
+        (
+            "a.osm",
+            NO_ROADS.replace(b'lat="1"', b'lat="north"'),
+            "<node id=1> has lat='north', expected degrees",
+        ),
         ("a.osm", NO_ROADS.replace(b"</osm>", b"<remark>timeout</remark></osm>"), "incomplete"),
         ("a.osm", FOOTWAY, "no road that cars may use"),
         ("a.pbf", b"hello", "not a .pbf extract"),

@@ -56,7 +56,7 @@ REFUSED = {
     "run --net nowhere.sumocfg": "'nowhere.sumocfg': No such file or directory",
     "run --routes nowhere.rou.xml": "no such file: 'nowhere.rou.xml'",
     "run --additional-files nowhere.xml": "no such file: 'nowhere.xml'",
-    "run --config nowhere.toml": "config 'nowhere.toml': No such file or directory",
+    "run --config nowhere.toml": "config 'nowhere.toml': cannot be read: No such file or directory",
     "run --config key.toml": "unknown key 'runns'; did you mean 'runs'?",
     "run --output nowhere/results.csv": "no such folder 'nowhere'",
     "run --output old.csv --resume --testers 0": "testers: Input should be greater than",

@@ -42,12 +42,12 @@ def silent(monkeypatch: pytest.MonkeyPatch) -> None:
 
 @pytest.fixture(scope="module")
 def grid(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A town of 529 junctions and 2,024 edges, with pavements and crossings."""
+    """A town of 144 junctions and 528 edges, with pavements and crossings."""
     import cavsumo.network.osm.netconvert as program
 
     file = tmp_path_factory.mktemp("grid") / "grid.net.xml"
     tool = program.sumo_home() / "bin" / "netgenerate"
-    words = "--grid --grid.number 23 --grid.length 120 --sidewalks.guess --crossings.guess -o"
+    words = "--grid --grid.number 12 --grid.length 120 --sidewalks.guess --crossings.guess -o"
     subprocess.run([tool, *words.split(), file], check=True, capture_output=True)
     return file
 
@@ -430,11 +430,11 @@ def test_an_unknown_junction_suggests_the_nearest(
 
 @needs_netconvert
 def test_a_town_is_inspected(grid: Path) -> None:
-    """2,024 edges: read, ranked, three junctions looked at; run would choose the first."""
+    """528 edges: read, ranked, three junctions looked at; run would choose the first."""
     network = read_network(grid)
     found = facts(network)
     here = ground(network, HALF_M)
     best = best_junctions(here, 3)
-    assert (found.edges, found.junctions, len(best)) == (2024, 529, 3)
+    assert (found.edges, found.junctions, len(best)) == (528, 144, 3)
     route, _ = best_route(network, here.roads, None, HALF_M)
     assert route.edges == best[0].ways[0].route.edges

@@ -437,7 +437,7 @@ def test_the_files_of_a_trace_can_be_named(
     ("change", "words"),
     [
         ({"plan": {}}, "holds no valid plan"),
-        ({"row": {"run": "x"}}, "holds no valid plan"),
+        ({"row": {"run": "x"}}, "line 1: run is 'x', expected a whole number"),
         ({"memory_kept": False}, "had learned before, which is large"),
         ({"format": "x"}, "format x, this version reads cavsumo-trace-1 and cavsumo-trace-2"),
         ({"format": 7}, "line 1 is not the head"),

@@ -14,6 +14,7 @@ from cavsumo.batch.worker import Worker
 from cavsumo.errors import InputError
 from cavsumo.model.scenario import plan_from
 from cavsumo.results.rows import Outcome
+from cavsumo.results.traces import parsed
 
 SetUp = Callable[..., Any]
 PROGRAMMED = ["timing", "proximity", "programmed-random", "election"]
@@ -34,10 +35,10 @@ def rows(prepared: Any, times: int = 1) -> list[dict[str, Any]]:
 @pytest.mark.parametrize("name", ["crossing", "junction"])
 def test_programmed_vehicles_meet_the_ego(set_up: SetUp, name: str) -> None:
     """With traffic, most episodes bring one within 10 m; nothing fails, nobody is teleported."""
-    found = rows(set_up(name, kind="car", agents=PROGRAMMED, runs=3, routes="auto", trace="none"))
-    assert len(found) == 12
+    found = rows(set_up(name, kind="car", agents=PROGRAMMED, runs=2, routes="auto", trace="none"))
+    assert len(found) == 8
     assert all(row["outcome"] != "error" for row in found), found
-    assert sum(row["min_gap_m"] < 10.0 for row in found) >= 9
+    assert sum(row["min_gap_m"] < 10.0 for row in found) >= 6
     assert sum(row["teleports"] for row in found) == 0
 
 
@@ -75,7 +76,7 @@ def test_an_untriggered_vehicle_waits_for_good(set_up: SetUp, types: tuple[str, 
         trace="all",
     )
     for outcome in outcomes(prepared):
-        (tester,) = outcome.frames[-1]["testers"].values()
+        (tester,) = parsed(outcome.trace).frames[-1]["testers"].values()
         assert tester[2] < 0.5
         assert outcome.row["outcome"] == "not_triggered"
         assert outcome.row["contacts"] == 0
@@ -99,13 +100,14 @@ def test_at_the_end_of_its_way_a_vehicle_comes_to_rest(
         kind="car",
         approaches=types,
         testers=1,
+        runs=1,
         agents=["programmed-random"],
         params={"rate_per_s": 0.0 if "following" in types else 5.0},
         ego="constant",
         ego_params={"speed": 0.0},
         trace="all",
     )
-    (tester,) = outcomes(prepared)[0].frames[-1]["testers"].values()
+    (tester,) = parsed(outcomes(prepared)[0].trace).frames[-1]["testers"].values()
     assert tester[2] < 0.1
     inside = tester[0] + 2.25 <= 99.0
     assert inside or "merging" in types

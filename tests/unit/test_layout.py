@@ -20,7 +20,7 @@ ROOMS = {
     room: frozenset(uses.split())
     for room, uses in {
         "model": "",
-        "games": "",
+        "games": "model",
         "network": "model",
         "agents": "model games",
         "assertions": "model network agents",

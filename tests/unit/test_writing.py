@@ -3,16 +3,21 @@
 from __future__ import annotations
 
 import json
+import os
 import shutil
 import subprocess
 import sys
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from concurrent.futures import Executor, Future
 from pathlib import Path
 from typing import Any
 
 import pytest
 from support import content
 
+from cavsumo.batch.batch_run import BatchRun
+from cavsumo.batch.messages import Answer
+from cavsumo.batch.prepared import PreparedBatch, manifest
 from cavsumo.errors import BatchError, ResultsError
 from cavsumo.results.columns import COLUMNS
 from cavsumo.results.reading import HEADER, check_replaceable, read_manifest, read_rows
@@ -312,6 +317,113 @@ def test_damage_is_named_and_nothing_is_changed(
     assert words in str(caught.value)
     assert "r.csv" in str(caught.value)
     assert content(file.parent) == before
+
+
+# Somebody else at the file while the batch is written ---------------------------------------------
+
+
+def removed(file: Path) -> None:
+    """As rm does."""
+    file.unlink()
+
+
+def replaced(file: Path) -> None:
+    """As an editor does, or another run after a removal."""
+    other = file.with_suffix(".other")
+    other.write_bytes(file.read_bytes())
+    other.replace(file)
+
+
+def cut(file: Path) -> None:
+    """As ``> r.csv`` does."""
+    file.write_bytes(b"")
+
+
+def longer(file: Path) -> None:
+    """As ``>> r.csv`` does."""
+    with file.open("ab") as stream:
+        stream.write(b"9\n")
+
+
+def spoiled(file: Path) -> None:
+    """As long as before, with other content."""
+    text = file.read_bytes()
+    with file.open("r+b") as stream:
+        stream.write(text[:-2] + b"?\n")
+    os.utime(file, ns=(0, 0))
+
+
+MEDDLING = [
+    (removed, "the file was removed while"),
+    (replaced, "the file was replaced by another file while"),
+    (cut, "the file has 0 bytes where"),
+    (longer, "bytes where"),
+    (spoiled, "the file was changed while"),
+]
+
+
+@pytest.mark.parametrize(("meddle", "words"), MEDDLING)
+@pytest.mark.parametrize("then", ["write", "checkpoint", "replace", "finish"])
+def test_a_file_that_somebody_else_changes_is_noticed(
+    file: Path, meddle: Callable[[Path], None], words: str, then: str
+) -> None:
+    """Before the next row, note or end: nothing more is written, and it is not said to be whole."""
+    with Recorder(file) as recorder:
+        recorder.begin(PLAN)
+        recorder.write(outcome(0))
+        meddle(file)
+        there = content(file.parent)
+        with pytest.raises(BatchError) as error:
+            {
+                "write": lambda: recorder.write(outcome(1)),
+                "checkpoint": lambda: recorder.checkpoint({}),
+                "replace": lambda: recorder.replace({0: outcome(0)}),
+                "finish": lambda: recorder.finish("finished", {}),
+            }[then]()
+    assert words in str(error.value)
+    assert "r.csv" in str(error.value)
+    assert content(file.parent) == there
+    assert read_manifest(file)["status"] == "running"
+
+
+def test_a_file_that_is_only_touched_stays_ours(file: Path, whole: dict[str, bytes]) -> None:
+    """Another time on it changes no row; after rows that were there, and replaced ones, too."""
+    write(file, runs=range(2), status="running")
+    todo = iter(range(RUNS))
+    with Recorder(file) as recorder:
+        list(recorder.resume(read_manifest(file), todo))
+        os.utime(file, ns=(0, 0))
+        recorder.write(outcome(2))
+        recorder.replace({2: outcome(2)})
+        os.utime(file, ns=(0, 0))
+        recorder.write(outcome(3))
+        recorder.finish("finished", {})
+    assert content(file.parent) == whole
+
+
+def test_a_run_whose_results_are_removed_ends_with_one_sentence(
+    set_up: Callable[..., PreparedBatch], file: Path
+) -> None:
+    """It is no finished batch; what it found so far is in nobody's place."""
+    prepared = set_up(agents=["noop"], runs=4, end=1.0, trace="none")
+
+    class Meddler(Executor):
+        def submit(self, fn: Any, /, *args: Any, **kwargs: Any) -> Future[Any]:
+            _, jobs = args
+            if jobs[0].run == 2:
+                file.unlink()
+            future: Future[Any] = Future()
+            future.set_result([Answer(outcome(job.run), None) for job in jobs])
+            return future
+
+    with Recorder(file) as recorder:
+        batch_run = BatchRun(prepared, recorder, Meddler(), 1, lambda: False)
+        batch_run.begin(manifest(prepared))
+        for way_out in (batch_run.play, batch_run.end):
+            with pytest.raises(BatchError, match="was removed while"):
+                way_out()
+    assert not file.exists()
+    assert json.loads(file.with_suffix(".json").read_text())["status"] == "running"
 
 
 # Odd text -----------------------------------------------------------------------------------------

@@ -6,7 +6,6 @@ SUMO uses a seed modulo 2^31, so seeds that are equal modulo 2^31 count as equal
 from __future__ import annotations
 
 import contextlib
-import json
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -15,6 +14,7 @@ from typing import Any
 import numpy as np
 
 from cavsumo.errors import InputError, ResultsError
+from cavsumo.model.documents import json_of, read_text
 from cavsumo.model.scenario import BatchPlan
 from cavsumo.model.seeds import episode_seed
 from cavsumo.results.present import present_paths
@@ -117,8 +117,8 @@ def _files_in(params: Mapping[str, Any]) -> tuple[list[Path], list[Path]]:
 def _is_manifest(file: Path) -> bool:
     """Whether a JSON file is the manifest of a batch."""
     try:
-        data = json.loads(file.read_text(encoding="utf-8"))
-    except (OSError, ValueError):
+        data = json_of(read_text(file, "parameter"))
+    except (InputError, ValueError):
         return False
     return isinstance(data, dict) and data.get("format") == FORMAT
 

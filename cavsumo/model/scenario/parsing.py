@@ -8,7 +8,8 @@ from typing import Any
 
 from pydantic import ValidationError
 
-from cavsumo.errors import InputError, UnknownName
+from cavsumo.errors import InputError, UnknownName, shown
+from cavsumo.model.documents import first_problem
 from cavsumo.model.named_networks import check_network, is_named, routes_of
 from cavsumo.model.scenario.fields import settings as offered
 from cavsumo.model.scenario.plan import BatchPlan
@@ -35,6 +36,9 @@ def plan_from(
     check_keys(settings, source)
     if "net" not in settings:
         raise InputError(f"{source}: no network given; name one with --net FILE")
+    for key in ("net", "routes"):
+        if not isinstance(settings.get(key, ""), str | Path):
+            raise InputError(f"{source}: {key}: expected a path, got {shown(settings[key])}")
     settings = with_configuration(settings, source)
     places = places or {}
     if str(settings["net"]) not in places:
@@ -92,7 +96,7 @@ def _route_file(scenario: Mapping[str, Any], source: str) -> Path | None:
     if given is not None and str(given) != "none" and drawn:
         raise InputError(
             f"{source}: traffic comes from routes {str(given)!r} or is drawn with traffic "
-            f"{scenario['traffic']!r}, not both; routes none or traffic none leaves one"
+            f"{shown(scenario['traffic'])}, not both; routes none or traffic none leaves one"
         )
     if given is not None or drawn:
         return None if given is None or str(given) == "none" else Path(given)
@@ -115,6 +119,4 @@ def _first_problem(error: ValidationError, source: str) -> InputError:
     if problem["type"] == "literal_error" and isinstance(given, str):
         words = next((s.words for s in offered() if s.key == key), ())
         return UnknownName("value", given, words, f"{source}: {place}")
-    message = problem["msg"].removeprefix("Value error, ")
-    shown = "" if problem["type"] == "missing" else f", got {given!r}"
-    return InputError(f"{source}: {place}: {message}{shown}")
+    return InputError(f"{source}: {first_problem(error, 'scenario')}")

@@ -154,8 +154,9 @@ class Scenario(BaseModel):
     @classmethod
     def _formulas_are_asserted(cls, given: Any) -> Any:
         """Formulas without a list of assertions are what is asserted."""
-        if isinstance(given, Mapping) and given.get("formulas") and "assertions" not in given:
-            return {**given, "assertions": tuple(given["formulas"])}
+        formulas = given.get("formulas") if isinstance(given, Mapping) else None
+        if formulas and isinstance(formulas, Mapping) and "assertions" not in given:
+            return {**given, "assertions": tuple(formulas)}
         return given
 
     @field_validator("step_length")

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import bz2
 import gzip
+import re
 import zlib
 from collections import Counter
 from collections.abc import Container, Iterator, Mapping
@@ -17,7 +18,7 @@ from typing import Any, NamedTuple, TextIO
 from xml.etree import ElementTree
 from xml.sax.saxutils import quoteattr
 
-from cavsumo.errors import InputError
+from cavsumo.errors import InputError, shown
 from cavsumo.network.osm.xml_stream import Element, read_elements
 
 Box = tuple[float, float, float, float]  # west, south, east, north [degrees]
@@ -29,6 +30,8 @@ TRACKS = frozenset({"highway", "railway"})
 SIDES, COUNTRIES = ("left", "right"), ("addr:country", "is_in:country_code")
 # Tags whose values begin with the code of the country that made the rule.
 RULES = ("traffic_sign", "source:maxspeed", "maxspeed:type", "zone:traffic", "zone:maxspeed")
+NUMBER = re.compile(r"-?[0-9]{1,18}")  # of an item: OpenStreetMap has 64 bits
+COORDINATE = re.compile(r"[-+]?[0-9]{1,3}(\.[0-9]{1,30})?([eE][-+]?[0-9]{1,2})?")
 KINDS = {"n": "node", "w": "way", "r": "relation"}
 
 
@@ -185,12 +188,15 @@ def read_items(file: Path) -> Iterator[Item]:
         return
     try:
         yield from _xml_items(file)
-    except (ElementTree.ParseError, EOFError, OSError, zlib.error) as error:
+    except ElementTree.ParseError as error:
         raise InputError(f"extract {str(file)!r}: not well-formed XML: {error}") from error
-    except (KeyError, ValueError) as error:
+    except (EOFError, zlib.error, gzip.BadGzipFile) as error:
         raise InputError(
-            f"extract {str(file)!r}: an item without id or place: {type(error).__name__}: {error}"
+            f"extract {str(file)!r}: not well-formed XML: a damaged archive"
         ) from error
+    except OSError as error:
+        why = error.strerror or "a damaged archive"
+        raise InputError(f"extract {str(file)!r}: cannot be read: {why}") from error
 
 
 def _xml_items(file: Path) -> Iterator[Item]:
@@ -201,22 +207,54 @@ def _xml_items(file: Path) -> Iterator[Item]:
         for element in read_elements(stream, str(file)):
             said = element.attrib
             if said.get("action") != "delete" and said.get("visible") != "false":
-                yield _from_xml(element)
+                try:
+                    item = _from_xml(element)
+                except ValueError as error:
+                    raise InputError(f"extract {str(file)!r}: {error}") from error
+                yield item
 
 
 def _from_xml(element: Element) -> Item:
-    """An item from its element."""
-    kind, number, parts = element.tag, int(element.attrib["id"]), element.parts
-    tags = {tag["k"]: tag["v"] for tag in parts["tag"]}
+    """An item from its element; ValueError says which attribute is none."""
+    kind, parts = element.tag, element.parts
+    number = _number(f"<{kind}>", element.attrib, "id")
+    name = f"<{kind} id={number}>"
+    tags = {_text(name, tag, "k"): _text(name, tag, "v") for tag in parts["tag"]}
     if kind == "node":
-        lat, lon = element.attrib["lat"], element.attrib["lon"]
-        if not (abs(float(lat)) <= 90 and abs(float(lon)) <= 180):
-            raise ValueError(f"node {number} at {lat}, {lon}")
+        lat, lon = (_degrees(name, element.attrib, *key) for key in (("lat", 90), ("lon", 180)))
         return Item(kind, number, tags, lat, lon)
     if kind == "way":
-        return Item(kind, number, tags, refs=tuple(int(nd["ref"]) for nd in parts["nd"]))
-    members = tuple((m["type"], int(m["ref"]), m.get("role", "")) for m in parts["member"])
+        refs = tuple(_number(f"<nd> of {name}", nd, "ref") for nd in parts["nd"])
+        return Item(kind, number, tags, refs=refs)
+    member = f"<member> of {name}"
+    members = tuple(
+        (_text(member, m, "type"), _number(member, m, "ref"), m.get("role", ""))
+        for m in parts["member"]
+    )
     return Item(kind, number, tags, members=members)
+
+
+def _text(name: str, attributes: Mapping[str, str], key: str) -> str:
+    """An attribute; ValueError when there is none."""
+    if key not in attributes:
+        raise ValueError(f"{name} has no {key}")
+    return attributes[key]
+
+
+def _number(name: str, attributes: Mapping[str, str], key: str) -> int:
+    """An attribute as the number of an item; ValueError when it is none."""
+    text = _text(name, attributes, key)
+    if not NUMBER.fullmatch(text):
+        raise ValueError(f"{name} has {key}={shown(text)}, expected a whole number")
+    return int(text)
+
+
+def _degrees(name: str, attributes: Mapping[str, str], key: str, most: int) -> str:
+    """An attribute that is a coordinate, as written; ValueError when it is none."""
+    text = _text(name, attributes, key)
+    if not (COORDINATE.fullmatch(text) and abs(float(text)) <= most):
+        raise ValueError(f"{name} has {key}={shown(text)}, expected degrees from -{most} to {most}")
+    return text
 
 
 def _pbf_items(file: Path) -> Iterator[Item]:

@@ -66,7 +66,9 @@ def _feed(parser: ElementTree.XMLParser, chunk: bytes, name: str) -> None:
     try:
         parser.feed(chunk)
     except (LookupError, ValueError) as error:
-        raise InputError(f"extract {name!r}: not well-formed XML: {error}") from error
+        raise InputError(
+            f"extract {name!r}: not well-formed XML: its encoding cannot be read, expected UTF-8"
+        ) from error
 
 
 class _Target:
