@@ -108,7 +108,11 @@ def test_a_bomb_is_not_unpacked(folder: Path, monkeypatch: pytest.MonkeyPatch) -
         unpacked(folder, sha)
 
 
-@pytest.mark.parametrize("data", [gzip.compress(b"other"), gzip.compress(TEXT)[:-20], b"no gzip"])
+@pytest.mark.parametrize(
+    "data",
+    [gzip.compress(b"other"), gzip.compress(TEXT)[:-20], b"no gzip"],
+    ids=["other", "cut", "no gzip"],
+)
 def test_another_content_is_refused(folder: Path, data: bytes) -> None:
     """In one sentence that names the file; no copy remains."""
     folder.mkdir(parents=True)
