@@ -60,10 +60,11 @@ def keep(folder: Path, file: Path, sha: str) -> bool:
         return True
     folder.mkdir(parents=True, exist_ok=True)
     new, digest = folder / f".{sha[:DIGITS]}.new", hashlib.sha256()
+    new.unlink(missing_ok=True)  # it may be a link
     try:
         with (
             file.open("rb") as source,
-            new.open("wb") as raw,
+            new.open("xb") as raw,
             gzip.GzipFile("", "wb", LEVEL, raw, mtime=0) as packed,
         ):
             while data := source.read(CHUNK):

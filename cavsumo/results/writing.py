@@ -31,6 +31,7 @@ from cavsumo.results.reading import (
     STARTING,
     check_replaceable,
     ego_log_name,
+    inside,
     trace_name,
     whole_lines,
 )
@@ -93,6 +94,8 @@ class Recorder:
     def keep(self, files: Mapping[str, Path]) -> list[Path]:
         """Keep the inputs of the batch, by their checksums; returns those that are too large."""
         folder = self.trace_folder / INPUTS
+        if folder.is_symlink():
+            raise ResultsError(f"results {str(self.csv_file)!r}: {str(folder)!r} is a link")
         try:
             remove_others(folder, set(files))
             return [file for sha, file in files.items() if not keep(folder, file, sha)]
@@ -105,7 +108,10 @@ class Recorder:
         Args:
             manifest: the recorded one, with what has changed since.
             todo: the numbers of the batch's episodes in order; left behind the last one done.
+
+        Raises ResultsError where the folder of traces is a link that leads out.
         """
+        inside(self.csv_file, self.trace_folder.name)
         if manifest.get("status") != STARTING:
             yield from self._whole_rows(todo)
         try:
@@ -191,7 +197,7 @@ class Recorder:
     def _put(self, name: str, text: str) -> bool:
         """Write a file beside the rows, none without text; returns whether one existed."""
         file = self.csv_file.parent / name
-        there = self._has_folder and file.exists()
+        there = self._has_folder and os.path.lexists(file)  # links are not followed
         if there:
             file.unlink()
         if text:
@@ -278,6 +284,7 @@ class Recorder:
         text = json.dumps(data, indent=1, ensure_ascii=False, allow_nan=False)
         new = self.manifest_file.with_name(f".{self.manifest_file.name}.new")
         try:
+            new.unlink(missing_ok=True)  # it may be a link
             new.write_text(text + "\n", encoding="utf-8", errors=UNENCODABLE)
             new.replace(self.manifest_file)
         except OSError:

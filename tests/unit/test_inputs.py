@@ -5,6 +5,7 @@ from __future__ import annotations
 import gzip
 import hashlib
 import os
+import shutil
 from pathlib import Path
 
 import pytest
@@ -14,6 +15,7 @@ from cavsumo.model.scenario import BatchPlan, plan_from
 from cavsumo.results import inputs
 from cavsumo.results.inputs import inputs_folder, keep, kept_name, remove_others, unpacked
 from cavsumo.results.present import present_paths
+from cavsumo.results.writing import Recorder
 
 TEXT = b"<net>" + 1000 * b"<edge/>" + b"</net>\n"
 SHA = hashlib.sha256(TEXT).hexdigest()
@@ -106,7 +108,11 @@ def test_a_bomb_is_not_unpacked(folder: Path, monkeypatch: pytest.MonkeyPatch) -
         unpacked(folder, sha)
 
 
-@pytest.mark.parametrize("data", [gzip.compress(b"other"), gzip.compress(TEXT)[:-20], b"no gzip"])
+@pytest.mark.parametrize(
+    "data",
+    [gzip.compress(b"other"), gzip.compress(TEXT)[:-20], b"no gzip"],
+    ids=["other", "cut", "no gzip"],
+)
 def test_another_content_is_refused(folder: Path, data: bytes) -> None:
     """In one sentence that names the file; no copy remains."""
     folder.mkdir(parents=True)
@@ -178,3 +184,26 @@ def test_a_file_that_is_nowhere_is_named(net: Path, plan: BatchPlan, tmp_path: P
         present_paths(plan, origin, file)
     with pytest.raises(InputError, match="sha256 unknown"):
         present_paths(plan, {}, file)
+
+
+# Written
+
+
+def test_links_in_a_strangers_folder_are_not_followed(
+    net: Path, folder: Path, tmp_path: Path
+) -> None:
+    """What is written replaces the link, or is refused; nothing outside changes."""
+    outside = tmp_path / "outside"
+    outside.mkdir()
+    folder.mkdir(parents=True)
+    (folder / f".{SHA[:12]}.new").symlink_to(outside / "new")
+    (folder / kept_name(net, SHA)).symlink_to(outside / "kept")
+    assert keep(folder, net, SHA)
+    assert gzip.decompress((folder / kept_name(net, SHA)).read_bytes()) == TEXT
+    shutil.rmtree(folder)
+    folder.symlink_to(outside)
+    with Recorder(tmp_path / "results.csv") as recorder:
+        recorder.begin({})
+        with pytest.raises(ResultsError, match="inputs' is a link"):
+            recorder.keep({SHA: net})
+    assert list(outside.iterdir()) == []

@@ -282,8 +282,8 @@ def test_policies_play_beside_registered_agents(
 ) -> None:
     """Two policies and timing, relative paths: the rows do not depend on the number of processes.
 
-    The file's checksum is in the manifest; a replay is the same; a resume and a replay notice a
-    file that has changed.
+    The file's checksum is in the manifest; a replay is the same; a resume notices a file that has
+    changed, and a replay takes the copy that was kept.
     """
     monkeypatch.chdir(tmp_path)
     Path("across.npz").write_bytes(kept.read_bytes())
@@ -308,4 +308,4 @@ def test_policies_play_beside_registered_agents(
     assert main(["replay", "one.csv", "0"]) == 0
     write_policy(Path("across.npz"), constant(1.0, 0.0, 0.0, 0.0, 0.0, actions="targets"))
     assert main(["run", "--resume", "-o", "one.csv", "--runs", "3", "-q"]) == 2
-    assert main(["replay", "one.csv", "0"]) == 1
+    assert main(["replay", "one.csv", "0"]) == 0

@@ -29,7 +29,7 @@ finite = st.floats(allow_nan=False, allow_infinity=False)
 def row(run: int, **more: Any) -> dict[str, Any]:
     """The row of an episode in which nothing was tested."""
     head = {"run": run, "agent": "noop", "ego": "sumo", "seed": 7, "tester": ""}
-    return head | {"outcome": "not_triggered", "wall_s": 0.5} | more
+    return head | {"outcome": "not_triggered", "time_s": 1.0, "wall_s": 0.5} | more
 
 
 def snapshot(step: int, x: float = 1.0) -> Snapshot:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import shutil
 import subprocess
 import sys
 from collections.abc import Callable, Mapping, Sequence
@@ -580,3 +581,21 @@ def test_a_row_that_cannot_be_written_can_be_written_later(file: Path) -> None:
     assert [row["run"] for row in read_rows(file)] == ["0"]
     file.with_suffix("").unlink()
     assert resume(file) == ["0"]
+
+
+def test_links_among_results_that_are_continued_are_not_followed(file: Path) -> None:
+    """A stranger's unfinished batch: its links are replaced, a folder that leads out is refused."""
+    write(file, range(1), status="running")
+    outside = file.parent.parent / f"{file.parent.name}-outside"
+    outside.mkdir()
+    file.with_suffix("").mkdir(exist_ok=True)
+    links = {file.with_suffix("") / "run000001.jsonl", file.parent / ".r.json.new"}
+    for link in links:
+        link.symlink_to(outside / link.name)
+    assert resume(file) == ["0"]
+    assert not any(link.is_symlink() for link in links)
+    shutil.rmtree(file.with_suffix(""))
+    file.with_suffix("").symlink_to(outside)
+    with pytest.raises(ResultsError, match="'r' leads out of their folder"):
+        resume(file)
+    assert list(outside.iterdir()) == []

@@ -65,14 +65,20 @@ def used(results: Sequence[Path], params: Mapping[str, Any]) -> Used:
             for end in (".csv", place.suffix)
         }
         known, silent = _files_in({**plan.params, **{k: str(v) for k, v in kept.items()}})
-        origin = dict(manifest.get("certifies") or {}).get("results", "none")
-        todo += known + [f for f in (Path(origin),) if f.with_suffix(".json").is_file()]
+        origin = Path(dict(manifest.get("certifies") or {}).get("results", "none"))
+        sources = [file for file in (origin, csv_file.parent / origin.name) if _is_there(file)]
+        todo += known + sources[:1]
         done |= dict.fromkeys(silent, False)
     return Used(
         frozenset(seeds),
         tuple(named.get(file, file) for file, recorded in done.items() if recorded),
         tuple(named.get(file, file) for file, recorded in done.items() if not recorded),
     )
+
+
+def _is_there(csv_file: Path) -> bool:
+    """Whether there is the manifest of results."""
+    return csv_file.with_suffix(".json").is_file()
 
 
 def _kept(plan: BatchPlan, manifest: Mapping[str, Any], csv_file: Path) -> dict[str, Path]:
