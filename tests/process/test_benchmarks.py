@@ -51,7 +51,11 @@ def numbers(line: str) -> list[float]:
     return [float(word) for word in re.findall(r"-?\d+\.?\d*(?:e[-+]\d+)?", line)]
 
 
-LIBRARIES = {"rings": "test_games.py", "storm": "test_games_random.py"}
+LIBRARIES = {
+    "rings": "test_games.py",
+    "storm": "test_games_random.py",
+    **dict.fromkeys(("fuzz", "fuzz_cases", "fuzz_inputs"), "test_fuzz.py"),
+}
 
 
 def test_every_benchmark_is_played_here() -> None:
@@ -156,6 +160,24 @@ def test_overlaps(play: Play) -> None:
     """An episode on the straight road, with drawn traffic."""
     said = play("overlaps", "--net", NET, "--agent", "timing", "--runs", "1")
     assert said.splitlines()[1].split()[:3] == ["pedestrians", "timing", "1"]
+
+
+def test_places(play: Play) -> None:
+    """One place, one ego, two agents of which one learns for an episode."""
+    words = "--runs 1 --learn 1 --traffic 0 -j 1 --ego time-gap --agent timing"
+    said = play("places", NET, *words.split(), "--agent", "best-response")
+    lines = [line.split() for line in said.splitlines()[1:]]
+    assert [line[:3] for line in lines] == [
+        ["pedestrians", "time-gap", "timing"],
+        ["pedestrians", "time-gap", "best-response"],
+    ]
+    assert {len(line) for line in lines} == {11}
+
+
+def test_refusals(play: Play) -> None:
+    """The help and one refused command, each a process."""
+    said = play("refusals", "--rounds", "1", COMMANDS=("--help", "agents timming"))
+    assert [line.split("  ")[0] for line in said.splitlines()[1:]] == ["--help", "agents timming"]
 
 
 def test_pages(play: Play) -> None:

@@ -80,12 +80,13 @@ def test_sumo_is_given_the_route_that_everybody_draws(
 def test_without_a_display_it_says_so(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """Before anything is read or played."""
+    """Before a trace is read or played."""
     pytest.importorskip("sumo")
     for name in ("DISPLAY", "WAYLAND_DISPLAY"):
         monkeypatch.delenv(name, raising=False)
     monkeypatch.setattr(gui.sys, "platform", "linux")
-    assert main(["replay", str(tmp_path / "no.csv"), "1", "--gui"]) == Exit.USAGE
+    (tmp_path / "no.jsonl").touch()
+    assert main(["replay", str(tmp_path / "no.jsonl"), "--gui"]) == Exit.USAGE
     assert "there is no display to show it on" in capsys.readouterr().err
 
 

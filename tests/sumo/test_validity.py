@@ -268,6 +268,7 @@ def test_invalid_episodes_are_counted_apart() -> None:
         rows=pandas.DataFrame(cells),
         sequential=False,
         whose=("", "a", ""),
+        reference="",
     )
     shares = rates(group)
     assert (shares.invalid, shares.tests.total) == (1, 1)

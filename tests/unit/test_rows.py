@@ -23,8 +23,6 @@ from cavsumo.results.rows import Outcome, cell
 from cavsumo.results.traces import frame, read_trace, trace_head, trace_text
 from cavsumo.results.writing import Recorder
 
-finite = st.floats(allow_nan=False, allow_infinity=False)
-
 
 def row(run: int, **more: Any) -> dict[str, Any]:
     """The row of an episode in which nothing was tested."""
@@ -48,7 +46,8 @@ def seen(step: int, x: float = 1.0) -> dict[str, Any]:
 def played(run: int, *frames: dict[str, Any], **more: Any) -> Outcome:
     """The outcome of an episode, with a trace if there are frames."""
     mine = row(run, **more)
-    head = trace_head({"plan": {}, "sha256": {}, "versions": {}, "sumo_options": {}}, mine, None, [snapshot(0)], Recorded(0, ()))
+    origin: Row = {"plan": {}, "sha256": {}, "versions": {}, "sumo_options": {}}
+    head = trace_head(origin, mine, None, [snapshot(0)], Recorded(0, ()))
     return Outcome(mine, trace_text(head, frames) if frames else "")
 
 
@@ -228,7 +227,7 @@ def test_lines_that_are_no_frames_are_refused(tmp_path: Path, line: str) -> None
 
 
 @settings(deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
-@given(finite)
+@given(st.floats(-1e9, 1e9))
 def test_traces_keep_full_precision(tmp_path: Path, x: float) -> None:
     """What is read is bit for bit what was written: a replay is compared with it."""
     with recording(tmp_path / "r.csv") as recorder:
