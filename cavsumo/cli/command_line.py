@@ -70,7 +70,24 @@ class _OptionParser(argparse.ArgumentParser):
         fill, self.fill = self.fill, None
         if fill is not None:
             fill(self)
+        self._check_options(args or ())
         return super().parse_known_args(args, namespace)
+
+    def _check_options(self, words: Sequence[str]) -> None:
+        """Raise UnknownName with the nearest option for one that this command does not have.
+
+        argparse would first complain of a required option that was misspelt. The words after the
+        name of a command are that command's.
+        """
+        for word in words:
+            name = word.partition("=")[0]
+            if word == "--" or (self._subparsers is not None and word[:1] != "-"):
+                return
+            known = self._option_string_actions
+            if word[:2] == "--" and " " not in name and name not in known:
+                command = self.prog.partition(" ")[2]
+                long = [option for option in known if option[:2] == "--"]
+                raise UnknownName("option", name, long, command)
 
     def error(self, message: str) -> NoReturn:
         raise InputError(f"{message} (see {self.prog} --help)")

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 
 from cavsumo.errors import InputError
-from cavsumo.report.analysis import Report, analyse
+from cavsumo.report.analysis import analyse
 from cavsumo.report.formats import FORMATS
 from cavsumo.report.junit import junit
 from cavsumo.report.order import ReportOptions, check_report
@@ -18,31 +18,19 @@ def write_report_files(results: Sequence[Path], wanted: ReportOptions) -> str:
     Raises InputError; nothing is written when anything is wrong.
     """
     check_report(results, wanted)
-    write_page = _page_writer() if wanted.html is not None else None
     found = analyse(results, wanted.by)
     text = FORMATS[wanted.format](found)
     xml = junit(found.evidence) if wanted.junit is not None else ""
-    if write_page is not None and wanted.html is not None:
-        write_page(found, wanted.html, wanted.replays)
+    if wanted.html is not None:
+        from cavsumo.report.pages.report.document import write_report
+
+        write_report(found, wanted.html, wanted.replays)
     if wanted.junit is not None:
         _write("--junit", wanted.junit, xml)
     if wanted.output is not None:
         _write("--output", wanted.output, text)
         return ""
     return text
-
-
-def _page_writer() -> Callable[[Report, Path, int], None]:
-    """The function that writes the page, when what draws its plots is installed."""
-    try:
-        from cavsumo.report.pages.report.document import write_report
-    except ImportError as error:
-        if (error.name or "").partition(".")[0] != "matplotlib":
-            raise
-        raise InputError(
-            "--html needs the package matplotlib: pip install 'cavsumo[plot]'"
-        ) from None
-    return write_report
 
 
 def _write(option: str, file: Path, text: str) -> None:

@@ -349,7 +349,7 @@ def test_the_table_and_the_status_of_a_test_that_chance_does_not_touch(
     assert main(["certify", str(found), "0", "--runs", "3"]) == Exit.VIOLATED
     said = capsys.readouterr()
     bound = rounded_down(0.05 ** (1 / 3))
-    assert f"with probability at least {bound}, against this ego; of others it" in said.out
+    assert f"with probability at least {bound}, against this ego; it holds for no other" in said.out
     assert "constant: all 3 episodes came out the same: chance decides nothing" in said.out
     assert "its starts are kept" in said.err
     assert "was no test" not in said.err

@@ -130,7 +130,6 @@ def test_a_precision_beyond_floats_is_said(
 
 def test_pictures_are_drawn_and_the_same_bytes(tmp_path: Path) -> None:
     """Tree and policy; a game too big for a tree is refused."""
-    pytest.importorskip("matplotlib")
     file = write("figure2_like", tmp_path)
     drawn = []
     for i in range(2):

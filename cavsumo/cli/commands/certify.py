@@ -56,6 +56,7 @@ def certify(order: CertifyOptions) -> int:
     subject, record = _subject(order, plan, manifest)
     seed = fresh_seed(order.seed, order.runs, seeds.seeds)
     parts = _parts(order, manifest, subject, egos, seed)
+    _check_outputs(order, parts)
     manner = Manner(
         resume=order.resume,
         overwrite=order.overwrite,
@@ -64,7 +65,7 @@ def certify(order: CertifyOptions) -> int:
     )
     with _output(order) as output:
         batches = [_marked(b, order, subject) for b in checked(parts, output, manner)]
-        _check_batches(order, batches, subject, record)
+        _check_starts(batches, subject, record)
         _warn(manifest, batches[0].prepared, record, seeds, subject)
         if not order.quiet:
             print(_first_lines(order, subject, seeds, seed), file=sys.stderr)
@@ -80,14 +81,16 @@ def certify(order: CertifyOptions) -> int:
 # Checked
 
 
-def _check_batches(
-    order: CertifyOptions, batches: Sequence[CheckedBatch], subject: Subject, record: Record | None
-) -> None:
-    """Refuse to overwrite the results that are read, and starts that another ego would change."""
+def _check_outputs(order: CertifyOptions, parts: Sequence[Part]) -> None:
+    """Refuse to overwrite the results that are read."""
     read = {file.resolve() for file in (order.results, *order.apart)}
-    for batch in batches:
-        if batch.output.resolve() in read:
-            raise InputError(f"output {str(batch.output)!r}: is one of the results")
+    for output in [] if order.output is None else [part.output(order.output) for part in parts]:
+        if output.resolve() in read:
+            raise InputError(f"output {str(output)!r}: is one of the results")
+
+
+def _check_starts(batches: Sequence[CheckedBatch], subject: Subject, record: Record | None) -> None:
+    """Refuse starts that another ego would change."""
     for batch in batches if subject.told else ():
         for start in subject.told:
             recorded_start(batch.prepared.site, start)

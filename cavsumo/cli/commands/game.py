@@ -21,7 +21,7 @@ from rich.table import Table
 from rich.text import Text
 
 from cavsumo.cli.requests.game import SolveOptions
-from cavsumo.errors import Exit, InputError
+from cavsumo.errors import Exit
 from cavsumo.games.approach import Tell
 from cavsumo.games.files import read_game
 from cavsumo.games.model import Game
@@ -89,19 +89,14 @@ def _status(order: SolveOptions, verdict: Solvability, solution: Solution | None
 
 
 def _painters(order: SolveOptions) -> list[tuple[Any, Path]]:
-    """The functions that draw, with their files; InputError if that is impossible."""
-    wanted = [("--picture", order.picture, "draw_tree")]
-    wanted += [("--policy-picture", order.policy_picture, "draw_policy")]
+    """The functions that draw, with their files."""
+    wanted = [(order.picture, "draw_tree"), (order.policy_picture, "draw_policy")]
     found = []
-    for option, file, name in wanted:
+    for file, name in wanted:
         if file is None:
             continue
-        try:
-            from cavsumo.games import pictures
-        except ImportError:
-            raise InputError(
-                f"{option} needs the package matplotlib: pip install 'cavsumo[plot]'"
-            ) from None
+        from cavsumo.games import pictures
+
         found.append((getattr(pictures, name), file))
     return found
 

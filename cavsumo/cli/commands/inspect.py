@@ -18,7 +18,7 @@ from rich.text import Text
 from cavsumo.cli.requests.inspect import InspectOptions
 from cavsumo.cli.steps import SlowSteps
 from cavsumo.egos.base import EGO_KIND
-from cavsumo.errors import Exit, InputError, NetworkError
+from cavsumo.errors import Exit, NetworkError
 from cavsumo.model.named_networks import network_file
 from cavsumo.network.facts import Facts, facts
 from cavsumo.network.inspection import (
@@ -84,15 +84,11 @@ def _junctions(here: InspectedNetwork, look: InspectOptions) -> list[Junction]:
 
 
 def _drawing(picture: Path | None) -> Any:
-    """The function that draws, if a picture is requested; InputError if it is impossible."""
+    """The function that draws, imported if a picture is requested."""
     if picture is None:
         return None
-    try:
-        from cavsumo.network.drawing.picture import draw
-    except ImportError:
-        raise InputError(
-            "--picture needs the package matplotlib: pip install 'cavsumo[plot]'"
-        ) from None
+    from cavsumo.network.drawing.picture import draw
+
     return draw
 
 

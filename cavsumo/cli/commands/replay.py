@@ -2,23 +2,14 @@
 
 from __future__ import annotations
 
-import dataclasses
+import functools
 import sys
 from pathlib import Path
 
-from cavsumo.batch.playback import NOT_PLAYED_BACK, for_playback, played_back
 from cavsumo.batch.prepared import PreparedBatch, manifest
-from cavsumo.batch.replay import (
-    Record,
-    compare,
-    located,
-    prepared_again,
-    recorded,
-    recorded_alone,
-    replayed,
-)
+from cavsumo.batch.replay import Record, located, recorded, recorded_alone
+from cavsumo.batch.replaying import play_again, play_back
 from cavsumo.batch.shown import shown_site
-from cavsumo.batch.worker import Worker
 from cavsumo.cli.requests.replay import TRACE, ReplayOptions
 from cavsumo.errors import Exit, InputError
 from cavsumo.interop.fcd import write_fcd
@@ -35,16 +26,20 @@ def replay(file: Path, wanted: ReplayOptions) -> int:
         check_gui(wanted.delay)
     if wanted.playback and wanted.recorded:
         raise InputError("replay: --recorded plays nothing and --playback plays; name one of them")
-    found = _found(file, wanted)
-    record = _located(for_playback(found) if wanted.playback else found, file, wanted)
+    record = _found(file, wanted)
     if wanted.recorded:
+        record = _located(record, file, wanted)
         trace: Trace | None = _recorded_trace(record)
         site = shown_site(record.plan, trace) if wanted.shown else None
     elif wanted.playback:
-        trace, site = record.trace, _played_back(record)
-        record = _as_it_was(record, found)
+        here = functools.partial(_located, file=file, wanted=wanted)
+        record, site = play_back(record, here, _say_changes)
+        trace = record.trace
+        _say(record, "the same, played back")
     else:
-        trace, site = _played(record)
+        record = _located(record, file, wanted)
+        trace, site = play_again(record, _say_changes)
+        _say(record, "the same")
     if wanted.shown and trace is None:
         raise InputError(f"replay: run {record.run} ended in an error, there is nothing to show")
     if trace is not None and site is not None:
@@ -76,32 +71,10 @@ def _recorded_trace(record: Record) -> Trace:
     return record.trace
 
 
-def _played(record: Record) -> tuple[Trace | None, Site]:
-    """The trace of the episode played again, None where an error left none; and where it was."""
-    prepared = _prepared(record)
-    with Worker(prepared) as worker:
-        again = replayed(worker, record)
-    compare(record, again)
-    _say(record, "the same")
-    return again.trace, prepared.site
-
-
-def _played_back(record: Record) -> Site:
-    """Play an episode back; where it was."""
-    prepared = _prepared(record)
-    with Worker(prepared) as worker:
-        again = played_back(worker, record)
-    compare(record, again, NOT_PLAYED_BACK)
-    _say(record, "the same, played back")
-    return prepared.site
-
-
-def _prepared(record: Record) -> PreparedBatch:
-    """The prepared batch of a record; stderr names the changes since it was recorded."""
-    prepared = prepared_again(record)
+def _say_changes(record: Record, prepared: PreparedBatch) -> None:
+    """Print on stderr what has changed since an episode was recorded."""
     for change in changes(record.origin, manifest(prepared)):
         print(f"cavsumo: {change}", file=sys.stderr)
-    return prepared
 
 
 def _say(record: Record, how: str) -> None:
@@ -110,14 +83,6 @@ def _say(record: Record, how: str) -> None:
     compared = f"{len(frames)} frames" if frames is not None else "its row (no trace was kept)"
     row = record.row
     print(f"run {record.run} ({row['agent']}): {row['outcome']}, {compared}: {how}")
-
-
-def _as_it_was(record: Record, found: Record) -> Record:
-    """An episode that was played back with the plan that was recorded, its files where they are."""
-    here = {key: getattr(record.plan.scenario, key) for key in ("net", "additional")}
-    scenario = found.plan.scenario.model_copy(update=here)
-    plan = found.plan.model_copy(update={"scenario": scenario})
-    return dataclasses.replace(found, plan=plan)
 
 
 def _show(site: Site, record: Record, trace: Trace, wanted: ReplayOptions) -> None:
