@@ -1,4 +1,4 @@
-"""``OptionParser``: argparse with errors in one sentence, and options that are added when needed."""
+"""``OptionParser``: argparse with errors in one sentence; some options are added when needed."""
 
 from __future__ import annotations
 
