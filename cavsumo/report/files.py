@@ -4,33 +4,50 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
+from typing import NamedTuple
 
 from cavsumo.errors import InputError
 from cavsumo.report.analysis import analyse
 from cavsumo.report.formats import FORMATS
 from cavsumo.report.junit import junit
-from cavsumo.report.order import ReportOptions, check_report
+from cavsumo.report.order import ReportOptions, Tell, check_report, untold
 
 
-def write_report_files(results: Sequence[Path], wanted: ReportOptions) -> str:
-    """Write the files of a report; returns its text if that goes into none of them.
+class WrittenReport(NamedTuple):
+    """A report that was written.
+
+    Attributes:
+        text: of the report; empty if it went into a file.
+        files: names of the files and folders that were written.
+    """
+
+    text: str
+    files: Sequence[str]
+
+
+def write_report_files(
+    results: Sequence[Path], wanted: ReportOptions, tell: Tell = untold
+) -> WrittenReport:
+    """Write the files of a report.
 
     Raises InputError; nothing is written when anything is wrong.
     """
     check_report(results, wanted)
+    tell("computing the report", "")
     found = analyse(results, wanted.by)
     text = FORMATS[wanted.format](found)
     xml = junit(found.evidence) if wanted.junit is not None else ""
+    files: list[str] = []
     if wanted.html is not None:
         from cavsumo.report.pages.report.document import write_report
 
-        write_report(found, wanted.html, wanted.replays)
-    if wanted.junit is not None:
-        _write("--junit", wanted.junit, xml)
-    if wanted.output is not None:
-        _write("--output", wanted.output, text)
-        return ""
-    return text
+        files += write_report(found, wanted.html, wanted.replays, tell)
+    texts = ("--junit", wanted.junit, xml), ("--output", wanted.output, text)
+    for option, file, content in texts:
+        if file is not None:
+            _write(option, file, content)
+            files.append(str(file))
+    return WrittenReport(text if wanted.output is None else "", files)
 
 
 def _write(option: str, file: Path, text: str) -> None:

@@ -9,7 +9,7 @@ import sys
 import tempfile
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 from rich.console import Console
 
@@ -29,9 +29,11 @@ from cavsumo.batch.playing import played
 from cavsumo.batch.preflight import CheckedBatch, checked
 from cavsumo.batch.prepared import PreparedBatch
 from cavsumo.batch.replay import Record, prepared_again, recorded
+from cavsumo.batch.summary import result_files
 from cavsumo.batch.trust import check_trust
 from cavsumo.cli.commands.run import announce, exit_status
 from cavsumo.cli.requests.certify import CertifyOptions
+from cavsumo.cli.steps import SlowSteps, say_written
 from cavsumo.egos import make_ego
 from cavsumo.errors import Exit, InputError
 from cavsumo.model.bodies import kind_named
@@ -46,9 +48,42 @@ FORMAT = 1  # of the JSON; raised when a key changes its meaning or goes
 WIDTH = 120
 
 
+class _Ready(NamedTuple):
+    """What is played and shown, once all checks have passed."""
+
+    batches: Sequence[CheckedBatch]
+    egos: Egos
+    seeds: Used
+    seed: int
+    subject: Subject
+    record: Record | None
+    manifest: Mapping[str, Any]
+
+
 def certify(order: CertifyOptions) -> int:
     """Play the test and print the bounds; all checks precede the first written file."""
     means = Means(order.jobs)
+    with _output(order) as output:
+        with SlowSteps(quiet=order.quiet) as steps:
+            ready = _ready(order, output, steps)
+        subject, seeds, seed = ready.subject, ready.seeds, ready.seed
+        _warn(ready)
+        if not order.quiet:
+            print(_first_lines(order, subject, seeds, seed), file=sys.stderr)
+        ended, interrupted = played(ready.batches, means, _manner(order), announce)
+        if interrupted:
+            left = " --resume goes on" if order.output else ""
+            print(f"cavsumo: interrupted, so nothing is certified;{left}", file=sys.stderr)
+            return Exit.INTERRUPTED
+        _show(order, certified(ended, ready.egos, order.confidence), subject, seeds, seed)
+        if order.output is not None:
+            say_written(map(result_files, ended), quiet=order.quiet)
+    return exit_status(ended, interrupted, order.exit_zero)
+
+
+def _ready(order: CertifyOptions, output: Path, steps: SlowSteps) -> _Ready:
+    """Check and prepare everything."""
+    steps.begin(f"reading {order.results}")
     plan, manifest = recorded_plan(order.results)
     egos = opponents(order.egos, order.ego_param, plan.scenario)
     check_trust(plan.scenario, order.results, _allowed(order), ego=not order.egos)
@@ -57,25 +92,20 @@ def certify(order: CertifyOptions) -> int:
     seed = fresh_seed(order.seed, order.runs, seeds.seeds)
     parts = _parts(order, manifest, subject, egos, seed)
     _check_outputs(order, parts)
-    manner = Manner(
+    steps.begin("reading the network and looking for starts")
+    batches = [_marked(b, order, subject) for b in checked(parts, output, _manner(order))]
+    _check_starts(batches, subject, record)
+    return _Ready(batches, egos, seeds, seed, subject, record, manifest)
+
+
+def _manner(order: CertifyOptions) -> Manner:
+    """How existing results are treated, and what is printed."""
+    return Manner(
         resume=order.resume,
         overwrite=order.overwrite,
         quiet=order.quiet,
         exit_zero=order.exit_zero,
     )
-    with _output(order) as output:
-        batches = [_marked(b, order, subject) for b in checked(parts, output, manner)]
-        _check_starts(batches, subject, record)
-        _warn(manifest, batches[0].prepared, record, seeds, subject)
-        if not order.quiet:
-            print(_first_lines(order, subject, seeds, seed), file=sys.stderr)
-        ended, interrupted = played(batches, means, manner, announce)
-        if interrupted:
-            left = " --resume goes on" if order.output else ""
-            print(f"cavsumo: interrupted, so nothing is certified;{left}", file=sys.stderr)
-            return Exit.INTERRUPTED
-        _show(order, certified(ended, egos, order.confidence), subject, seeds, seed)
-    return exit_status(ended, interrupted, order.exit_zero)
 
 
 # Checked
@@ -164,14 +194,10 @@ def _output(order: CertifyOptions) -> Iterator[Path]:
 # Said
 
 
-def _warn(
-    manifest: Mapping[str, Any],
-    prepared: PreparedBatch,
-    record: Record | None,
-    seeds: Used,
-    subject: Subject,
-) -> None:
+def _warn(ready: _Ready) -> None:
     """Print warnings about the certificate on stderr."""
+    manifest, record, seeds = ready.manifest, ready.record, ready.seeds
+    prepared, subject = ready.batches[0].prepared, ready.subject
     for part, now in (("versions", prepared.versions), ("sha256", prepared.checksums)):
         was = manifest.get(part) or {}
         for name in sorted(was.keys() & now.keys()):

@@ -21,6 +21,7 @@ from rich.table import Table
 from rich.text import Text
 
 from cavsumo.cli.requests.game import SolveOptions
+from cavsumo.cli.steps import say_written
 from cavsumo.errors import Exit
 from cavsumo.games.approach import Tell
 from cavsumo.games.files import read_game
@@ -58,6 +59,7 @@ def solve_file(order: SolveOptions) -> int:
         return Exit.NOT_RUN
     for painter, file in painters:
         painter(game, verdict, solution, file)
+    say_written([file for _, file in painters], quiet=order.quiet)
     show = _json if order.as_json else _table
     print(show(order, game, verdict, solution))
     return _status(order, verdict, solution)

@@ -11,6 +11,7 @@ from cavsumo.batch.replay import Record, located, recorded, recorded_alone
 from cavsumo.batch.replaying import play_again, play_back
 from cavsumo.batch.shown import shown_site
 from cavsumo.cli.requests.replay import TRACE, ReplayOptions
+from cavsumo.cli.steps import SlowSteps, say_written
 from cavsumo.errors import Exit, InputError
 from cavsumo.interop.fcd import write_fcd
 from cavsumo.network.site import Site
@@ -26,7 +27,31 @@ def replay(file: Path, wanted: ReplayOptions) -> int:
         check_gui(wanted.delay)
     if wanted.playback and wanted.recorded:
         raise InputError("replay: --recorded plays nothing and --playback plays; name one of them")
-    record = _found(file, wanted)
+    with SlowSteps() as steps:
+        record = _found(file, wanted)
+        steps.begin(f"replaying run {record.run}")
+        record, trace, site = _taken(record, file, wanted)
+        if wanted.shown and trace is None:
+            raise InputError(
+                f"replay: run {record.run} ended in an error, there is nothing to show"
+            )
+        if trace is not None and site is not None:
+            _write(site, record, trace, wanted)
+    say_written([wanted.fcd, wanted.html])
+    if wanted.gui and trace is not None and site is not None:
+        from cavsumo.interop.gui import show
+
+        show(trace, record.plan.scenario, site, wanted.delay)
+    return Exit.OK
+
+
+def _taken(
+    record: Record, file: Path, wanted: ReplayOptions
+) -> tuple[Record, Trace | None, Site | None]:
+    """The episode as recorded, played back or played again: its record, trace and place.
+
+    There is no trace after an error, and no place where nothing is shown.
+    """
     if wanted.recorded:
         record = _located(record, file, wanted)
         trace: Trace | None = _recorded_trace(record)
@@ -40,11 +65,7 @@ def replay(file: Path, wanted: ReplayOptions) -> int:
         record = _located(record, file, wanted)
         trace, site = play_again(record, _say_changes)
         _say(record, "the same")
-    if wanted.shown and trace is None:
-        raise InputError(f"replay: run {record.run} ended in an error, there is nothing to show")
-    if trace is not None and site is not None:
-        _show(site, record, trace, wanted)
-    return Exit.OK
+    return record, trace, site
 
 
 def _found(file: Path, wanted: ReplayOptions) -> Record:
@@ -85,15 +106,11 @@ def _say(record: Record, how: str) -> None:
     print(f"run {record.run} ({row['agent']}): {row['outcome']}, {compared}: {how}")
 
 
-def _show(site: Site, record: Record, trace: Trace, wanted: ReplayOptions) -> None:
-    """Write and show the requested output."""
+def _write(site: Site, record: Record, trace: Trace, wanted: ReplayOptions) -> None:
+    """Write the requested files."""
     if wanted.fcd is not None:
         write_fcd(trace, wanted.fcd)
     if wanted.html is not None:
         from cavsumo.report.pages.replay.page import write_page
 
         write_page(record, trace, site, wanted.html)
-    if wanted.gui:
-        from cavsumo.interop.gui import show
-
-        show(trace, record.plan.scenario, site, wanted.delay)

@@ -10,10 +10,12 @@ from urllib.parse import quote
 
 from markupsafe import Markup
 
+from cavsumo.batch.sentences import many
 from cavsumo.batch.summary import percent
 from cavsumo.report.analysis import Report
 from cavsumo.report.cells import TOPICS, Table, number
 from cavsumo.report.compare import WORDS, PairedComparison
+from cavsumo.report.order import Tell, untold
 from cavsumo.report.pages.report import words
 from cavsumo.report.pages.report.links import LinkedRun, chosen, with_pages, write_pages
 from cavsumo.report.pages.report.places import MEANING, Map, maps
@@ -56,21 +58,25 @@ class Plot(NamedTuple):
     note: str = ""
 
 
-def write_report(report: Report, file: Path, replays: int) -> None:
-    """Write the page, and beside it those of some replays; raises InputError.
+def write_report(report: Report, file: Path, replays: int, tell: Tell = untold) -> list[str]:
+    """Write the page, and beside it those of some replays; returns the names of what was written.
+
+    Raises InputError.
 
     Args:
         replays: how many failures are shown as pages of their own; of the tests that the ego
             passed half as many.
     """
+    tell("drawing plots and maps", "")
     played = scenes(report.evidence.batches)
     failures, tests = chosen(report, replays)
     failures = with_pages(failures, replays, report, played)
     tests = with_pages(tests, replays // 2, report, played)
     folder = file.parent / f"{file.stem}_replays"
     text = page(report, played, failures, tests, folder.name)
-    write_pages([*failures, *tests], report.evidence.batches, played, folder)
+    pages = write_pages([*failures, *tests], report.evidence.batches, played, folder, tell)
     write(text, file)
+    return [str(file), *([f"{folder}/ ({many(pages, 'page')})"] if pages else [])]
 
 
 def page(
