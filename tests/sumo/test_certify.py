@@ -357,6 +357,18 @@ def test_the_table_and_the_status_of_a_test_that_chance_does_not_touch(
     assert list(tmp_path.iterdir()) == []
 
 
+def test_the_files_of_a_certificate_are_named(
+    found: Path, capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    """Those of each ego; the temporary ones of a certificate without -o are not."""
+    words = ["certify", str(found), "0", "--runs", "1", "--exit-zero"]
+    assert main(words) == Exit.OK
+    assert "wrote" not in capsys.readouterr().err
+    assert main([*words, "-o", str(tmp_path / "c.csv")]) == Exit.OK
+    files = f"{tmp_path / 'c-constant.csv'}, {tmp_path / 'c-constant.json'}"
+    assert f"cavsumo: wrote {files}" in capsys.readouterr().err
+
+
 def test_a_table_never_rounds_a_bound_up() -> None:
     """95 of 100 prove 0.8977, and not 0.898."""
     assert rounded_down(lower_bound(95, 100, 0.95)) == "0.8977"
