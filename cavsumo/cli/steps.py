@@ -26,7 +26,7 @@ class SlowSteps:
         self._lock = threading.Lock()
         self._timer = threading.Timer(AFTER_S, self._show)
         self._timer.daemon = True
-        self._line: Any = None  # of a terminal, with the time that has passed
+        self._line: Any = None  # of a terminal
 
     def __enter__(self) -> SlowSteps:
         self._begun = time.monotonic()
@@ -69,12 +69,12 @@ class SlowSteps:
 
 
 def _line() -> Any:
-    """A line with a step and the seconds so far."""
+    """A line with a step, on stderr."""
     from rich.console import Console
-    from rich.progress import Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
+    from rich.progress import Progress, SpinnerColumn, TextColumn
 
     said = TextColumn("{task.description}", markup=False)
-    columns = SpinnerColumn(), said, TimeElapsedColumn()
+    columns = SpinnerColumn(), said
     return Progress(*columns, console=Console(stderr=True), transient=True, redirect_stdout=False)
 
 

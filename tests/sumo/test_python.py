@@ -20,6 +20,7 @@ from support import content, rows, traces, untold
 import cavsumo
 from cavsumo import Results
 from cavsumo.batch import progress
+from cavsumo.batch.sentences import many
 from cavsumo.batch.worker import close_all
 from cavsumo.cli import main
 from cavsumo.results.columns import COLUMNS
@@ -243,7 +244,8 @@ def test_results_say_what_was_found(results: Results, by_command: Path) -> None:
     """In one line, and as tables for a notebook."""
     failures = int((results.rows["outcome"] == "violated").sum())
     assert repr(results).startswith("<Results: 10 episodes on crossing, ego sumo: ")
-    assert f"{failures} failures" in repr(results)
+    preventable = int((results.failures["avoidable"] == 1).sum())
+    assert f"{many(preventable, 'preventable failure')} in " in repr(results)
     assert str(by_command) in repr(cavsumo.load(by_command))
     shown = results._repr_html_()
     assert "<td>proximity</td><td>5</td>" in shown
