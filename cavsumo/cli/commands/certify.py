@@ -49,7 +49,7 @@ WIDTH = 120
 
 
 class _Ready(NamedTuple):
-    """What is played and shown, once all checks have passed."""
+    """The prepared parts of a certificate, after all checks."""
 
     batches: Sequence[CheckedBatch]
     egos: Egos
