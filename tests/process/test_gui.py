@@ -12,8 +12,9 @@ from pathlib import Path
 import pytest
 
 from cavsumo.batch.replay import Record
-from cavsumo.cli import main
-from cavsumo.errors import Exit, InputError
+from cavsumo.cli.commands.replay import replay
+from cavsumo.cli.requests.replay import ReplayOptions
+from cavsumo.errors import InputError
 from cavsumo.interop import gui
 from cavsumo.interop.gui import additional_file, check_gui, command, show
 from cavsumo.network.drawing.place import site_drawn
@@ -77,16 +78,14 @@ def test_sumo_is_given_the_route_that_everybody_draws(
     assert all(abs(site.route.path.project(x, y).lateral) < 0.05 for x, y in shape)
 
 
-def test_without_a_display_it_says_so(
-    monkeypatch: pytest.MonkeyPatch, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    """Before anything is read or played."""
+def test_without_a_display_it_says_so(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    """Before the episode is read or played."""
     pytest.importorskip("sumo")
     for name in ("DISPLAY", "WAYLAND_DISPLAY"):
         monkeypatch.delenv(name, raising=False)
     monkeypatch.setattr(gui.sys, "platform", "linux")
-    assert main(["replay", str(tmp_path / "no.csv"), "1", "--gui"]) == Exit.USAGE
-    assert "there is no display to show it on" in capsys.readouterr().err
+    with pytest.raises(InputError, match="there is no display to show it on"):
+        replay(tmp_path / "no.csv", ReplayOptions(1, gui=True))
 
 
 def test_without_sumo_gui_it_says_what_to_install(monkeypatch: pytest.MonkeyPatch) -> None:
