@@ -51,6 +51,14 @@ def _own_cache(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
 
 
 @pytest.fixture(scope="session", autouse=True)
+def _silent() -> Iterator[None]:
+    """Nothing is said of steps that take long: what is said must not depend on the machine."""
+    with pytest.MonkeyPatch.context() as patched:
+        patched.setattr("cavsumo.cli.steps.AFTER_S", 3600.0)
+        yield
+
+
+@pytest.fixture(scope="session", autouse=True)
 def _sites() -> Iterator[None]:
     """What is known of a network that comes with cavsumo is derived once."""
     with derived_once():

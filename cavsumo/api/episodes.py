@@ -10,9 +10,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from cavsumo.api.display import episode_html, episode_text
-from cavsumo.batch.replay import Record, compare, prepared_again, replayed
+from cavsumo.batch.replay import Record
+from cavsumo.batch.replaying import Located, play_again, play_back
 from cavsumo.batch.shown import shown_site
-from cavsumo.batch.worker import Worker
 from cavsumo.errors import InputError
 from cavsumo.network.site import Site
 from cavsumo.results.traces import Trace, states
@@ -82,13 +82,17 @@ class RecordedEpisode:
 
 def played_again(record: Record) -> RecordedEpisode:
     """An episode once more; raises DivergenceError where it first differs."""
-    prepared = prepared_again(record)
-    with Worker(prepared) as worker:
-        again = replayed(worker, record)
-    compare(record, again)
-    if again.trace is None:
+    trace, site = play_again(record)
+    if trace is None:
         raise InputError(f"replay: run {record.run} ended in an error, there is nothing to show")
-    return RecordedEpisode(record, again.trace, prepared.site)
+    return RecordedEpisode(record, trace, site)
+
+
+def played_back(record: Record, located: Located) -> RecordedEpisode:
+    """An episode whose recorded actions were played back; raises like ``play_back``."""
+    there, site = play_back(record, located)
+    assert there.trace is not None  # without one, nothing is played back
+    return RecordedEpisode(there, there.trace, site)
 
 
 def as_recorded(record: Record) -> RecordedEpisode:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import warnings
 import weakref
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -11,8 +12,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from cavsumo.api.display import ResultsSummary, results_html, results_text
-from cavsumo.api.episodes import RecordedEpisode, as_recorded, played_again
+from cavsumo.api.episodes import RecordedEpisode, as_recorded, played_again, played_back
 from cavsumo.batch.located import located
+from cavsumo.batch.replay import Record
 from cavsumo.batch.replay import recorded as find_recorded
 from cavsumo.batch.tally import Tally
 from cavsumo.errors import InputError
@@ -115,6 +117,7 @@ class Results:
         run: int,
         *,
         recorded: bool = False,
+        playback: bool = False,
         net: str | os.PathLike[str] | None = None,
         routes: str | os.PathLike[str] | None = None,
     ) -> RecordedEpisode:
@@ -123,15 +126,25 @@ class Results:
         Args:
             run: its number.
             recorded: use the recorded frames without playing the episode.
+            playback: play its recorded actions and traffic back, instead of asking its agent; needs
+                its trace and the network, and no routes.
             net, routes: where the network and the routes are now, if not where they were.
 
         Raises:
             DivergenceError: the episode departs from its record; the message says where first.
-            InputError: there is no such run, no frame of it was kept, or a file is missing.
+            InputError: there is no such run, no frame of it was kept, or a file is missing; or
+                both ``recorded`` and ``playback`` are wanted.
         """
+        if recorded and playback:
+            raise InputError("replay: recorded=True plays nothing and playback=True plays")
         found = find_recorded(self.file, run, None if self.trusted else ())
-        found = located(found, _path(net), _path(routes), shown=recorded)
-        return as_recorded(found) if recorded else played_again(found)
+
+        def here(record: Record) -> Record:
+            return located(record, _path(net), _path(routes), shown=recorded)
+
+        if playback:
+            return played_back(found, here)
+        return as_recorded(here(found)) if recorded else played_again(here(found))
 
     def report(self, file: str | os.PathLike[str], *, by: str = "agent", replays: int = 20) -> None:
         """Write the evidence into a file: rates with intervals, comparisons, times, causes.
@@ -154,7 +167,8 @@ class Results:
         else:
             endings = ", ".join((".html", ".xml", *REPORTS))
             raise InputError(f"report {str(path)!r}: expected a name that ends in {endings}")
-        write_report_files([self.file], wanted)
+        for problem in write_report_files([self.file], wanted).problems:
+            warnings.warn(problem, stacklevel=2)
 
     def __len__(self) -> int:
         return len(self.rows)

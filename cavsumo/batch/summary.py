@@ -111,10 +111,15 @@ def _files(ended: Sequence[Ended]) -> str:
     first, last = ended[0], ended[-1]
     if first is not last:
         return f"{first.csv_file} to {last.csv_file.name} ({len(ended)} batches)"
-    files = f"{first.csv_file}, {first.csv_file.with_suffix('.json')}"
-    if first.traces:
-        traces = sentences.many(first.traces, "trace")
-        files += f", {first.csv_file.with_suffix('')}/ ({traces})"
+    return result_files(first)
+
+
+def result_files(ended: Ended) -> str:
+    """The files of a batch: rows, manifest, folder of traces."""
+    files = f"{ended.csv_file}, {ended.csv_file.with_suffix('.json')}"
+    if ended.traces:
+        traces = sentences.many(ended.traces, "trace")
+        files += f", {ended.csv_file.with_suffix('')}/ ({traces})"
     return files
 
 

@@ -5,10 +5,11 @@ from __future__ import annotations
 import argparse
 import os
 import sys
-from collections.abc import Callable, Collection, Sequence
-from typing import Any, NoReturn
+from collections.abc import Sequence
+from typing import Any
 
 from cavsumo import __version__
+from cavsumo.cli.option_parser import OptionParser
 from cavsumo.cli.options import adders
 from cavsumo.errors import (
     BatchError,
@@ -73,36 +74,30 @@ def _joined(words: Sequence[str]) -> list[str]:
     return joined
 
 
-class _OptionParser(argparse.ArgumentParser):
-    """argparse with errors in one sentence and exit status 2.
+class _PrintCompletion(argparse.Action):
+    """Prints the script of a shell, and exits."""
 
-    Attributes:
-        commands: the names of the commands, of the parser that has them.
-        fill: adds the options of a command whose options are read from the scenario record, once
-            that command is called; the help of all commands does without them.
-    """
+    def __call__(self, parser: Any, _: Any, shell: Any, __: str | None = None) -> None:
+        from cavsumo.cli.completion import script
 
-    commands: Collection[str] = ()
-    fill: Callable[[argparse.ArgumentParser], None] | None = None
-
-    def parse_known_args(self, args: Any = None, namespace: Any = None) -> Any:
-        fill, self.fill = self.fill, None
-        if fill is not None:
-            fill(self)
-        return super().parse_known_args(args, namespace)
-
-    def error(self, message: str) -> NoReturn:
-        raise InputError(f"{message} (see {self.prog} --help)")
+        print(script(parser, shell))
+        parser.exit()
 
 
-def _parser() -> _OptionParser:
-    parser = _OptionParser(
+def _parser() -> OptionParser:
+    parser = OptionParser(
         prog="cavsumo",
         description="Which tests make this vehicle fail at this junction, are they fair, and how "
         "sure are we? Generates tests for autonomous vehicles in SUMO.",
         allow_abbrev=False,
     )
     parser.add_argument("--version", action="version", version=f"cavsumo {__version__}")
+    parser.add_argument(
+        "--print-completion",
+        action=_PrintCompletion,
+        choices=("bash", "fish", "zsh"),
+        help="print the script by which a shell completes names and options (docs/guide.md)",
+    )
     commands = parser.add_subparsers(title="commands", required=True, metavar="COMMAND")
     for add in adders():
         add(commands)

@@ -2,49 +2,57 @@
 
 from __future__ import annotations
 
-import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from pathlib import Path
+from typing import NamedTuple
 
 from cavsumo.errors import InputError
-from cavsumo.report.analysis import Report, analyse
+from cavsumo.report.analysis import analyse
 from cavsumo.report.formats import FORMATS
 from cavsumo.report.junit import junit
-from cavsumo.report.order import ReportOptions, check_report
+from cavsumo.report.order import ReportOptions, Tell, check_report, untold
 
 
-def write_report_files(results: Sequence[Path], wanted: ReportOptions) -> str:
-    """Write the files of a report; returns its text if that goes into none of them.
+class WrittenReport(NamedTuple):
+    """A report that was written.
+
+    Attributes:
+        text: of the report; empty if it went into a file.
+        files: names of the files and folders that were written.
+        problems: sentences that say which pages of replays cannot be made, and why.
+    """
+
+    text: str
+    files: Sequence[str]
+    problems: Sequence[str]
+
+
+def write_report_files(
+    results: Sequence[Path], wanted: ReportOptions, tell: Tell = untold
+) -> WrittenReport:
+    """Write the files of a report.
 
     Raises InputError; nothing is written when anything is wrong.
     """
     check_report(results, wanted)
-    write_page = _page_writer() if wanted.html is not None else None
+    tell("computing the report", "")
     found = analyse(results, wanted.by)
     text = FORMATS[wanted.format](found)
     xml = junit(found.evidence) if wanted.junit is not None else ""
-    if write_page is not None and wanted.html is not None:
-        for problem in write_page(found, wanted.html, wanted.replays):
-            print(f"cavsumo: --html: {problem}", file=sys.stderr)
-    if wanted.junit is not None:
-        _write("--junit", wanted.junit, xml)
-    if wanted.output is not None:
-        _write("--output", wanted.output, text)
-        return ""
-    return text
-
-
-def _page_writer() -> Callable[[Report, Path, int], list[str]]:
-    """The function that writes the page, when what draws its plots is installed."""
-    try:
+    files: list[str] = []
+    problems: list[str] = []
+    if wanted.html is not None:
         from cavsumo.report.pages.report.document import write_report
-    except ImportError as error:
-        if (error.name or "").partition(".")[0] != "matplotlib":
-            raise
-        raise InputError(
-            "--html needs the package matplotlib: pip install 'cavsumo[plot]'"
-        ) from None
-    return write_report
+
+        page = write_report(found, wanted.html, wanted.replays, tell)
+        files += page.files
+        problems += page.problems
+    texts = ("--junit", wanted.junit, xml), ("--output", wanted.output, text)
+    for option, file, content in texts:
+        if file is not None:
+            _write(option, file, content)
+            files.append(str(file))
+    return WrittenReport(text if wanted.output is None else "", files, problems)
 
 
 def _write(option: str, file: Path, text: str) -> None:

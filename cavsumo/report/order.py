@@ -2,12 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 from cavsumo.errors import InputError
 from cavsumo.results.reading import read_manifest
+
+Tell = Callable[[str, str], None]  # called with a step that begins, and how far it is
+
+
+def untold(step: str, detail: str) -> None:
+    """Tell nobody."""
 
 
 @dataclass(frozen=True)

@@ -1,6 +1,6 @@
 """Train a tester with stable-baselines3 and write it as a policy file.
 
-    pip install 'cavsumo[sb3,plot]'
+    pip install 'cavsumo[sb3]'
     python examples/train_tester/train.py --net networks/crossing.net.xml -o tester.npz
     cavsumo run --net networks/crossing.net.xml --agent policy:tester.npz --agent random
 

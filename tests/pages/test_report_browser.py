@@ -29,6 +29,13 @@ CONTRASTS = """() => {
 }"""
 SCROLLED = """() => Array.from(document.querySelectorAll(".wide"))
     .filter((e) => e.scrollWidth > e.clientWidth).length"""
+HINT = """(e) => getComputedStyle(e.querySelector("caption"), "::after").content"""
+FILLED = """() => Array.from(document.querySelectorAll(".tables"), (all) => {
+    const section = all.closest("section").getBoundingClientRect();
+    const right = Math.max(...Array.from(all.querySelectorAll("table"),
+        (table) => table.getBoundingClientRect().right));
+    return (right - section.left) / section.width;
+})"""
 SMALLEST = """() => Math.min(...Array.from(document.querySelectorAll(".plot svg text"),
     (text) => text.getBoundingClientRect().height))"""
 NASTY = "</script><img src=x onerror=alert(1)>{{ 7*7 }}$x$'\"`"
@@ -115,11 +122,30 @@ def test_the_keyboard_comes_by_every_link(open_page: Opened, file: Path) -> None
 
 
 def test_it_fits_a_phone(open_page: Opened, file: Path) -> None:
-    """The page is as wide as the screen; tables scroll in their own boxes."""
+    """The page is as wide as the screen; tables scroll in their own boxes, and say so."""
     page = open_page(file, PHONE, device_scale_factor=3, is_mobile=True, has_touch=True)
     assert page.evaluate("document.documentElement.scrollWidth") == PHONE["width"]
     assert page.evaluate(SCROLLED) >= 1
     assert page.evaluate(SMALLEST) >= 10
+    assert page.locator(".wide.cut").count() == page.evaluate(SCROLLED)
+    box = page.locator(".wide.cut").first
+    assert "scroll sideways" in box.evaluate(HINT)
+    column = box.locator("td").first
+    before = column.bounding_box()["x"]
+    box.evaluate("(e) => { e.scrollLeft = e.scrollWidth; }")
+    page.wait_for_selector(".wide.cut.end")
+    assert column.bounding_box()["x"] == before
+    assert box.locator("caption").bounding_box()["x"] == before
+
+
+def test_it_uses_the_width_of_a_laptop(open_page: Opened, file: Path) -> None:
+    """Every table is whole, and the tables of each section reach its right edge."""
+    page = open_page(file, LAPTOP)
+    assert page.evaluate(SCROLLED) == 0
+    assert page.locator(".wide.cut").count() == 0
+    filled = page.evaluate(FILLED)
+    assert len(filled) >= 6
+    assert min(filled) > 0.9
 
 
 def test_names_are_only_text(open_page: Opened, found_failure: Path, tmp_path: Path) -> None:

@@ -96,9 +96,10 @@ def test_a_network_comes_with_its_licence_its_command_and_its_log(
     assert f"cavsumo inspect {net}" in out
     assert f"cavsumo run --net {net}" in out
     lines = err.splitlines()
-    assert len(lines) == 3
+    assert len(lines) == 4
     assert f"netconvert gave {log.count('Warning: ')} warnings" in lines[0]
     assert lines[2].endswith("place.net.log")
+    assert lines[3] == f"cavsumo: wrote {net.with_name('place.net.log')}"
 
 
 @needs_netconvert

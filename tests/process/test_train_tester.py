@@ -98,7 +98,6 @@ def test_an_exported_policy_says_what_the_model_says(export: ModuleType) -> None
 def test_the_example_trains(tmp_path: Path) -> None:
     """A few decisions, from the environment to a policy file, a curve and its picture."""
     pytest.importorskip("stable_baselines3")
-    pytest.importorskip("matplotlib")
     net = ROOT / "networks" / "crossing.net.xml"
     few = ["--decisions", "30", "--every", "30", "--evaluations", "1"]
     done = subprocess.run(

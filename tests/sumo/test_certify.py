@@ -349,12 +349,24 @@ def test_the_table_and_the_status_of_a_test_that_chance_does_not_touch(
     assert main(["certify", str(found), "0", "--runs", "3"]) == Exit.VIOLATED
     said = capsys.readouterr()
     bound = rounded_down(0.05 ** (1 / 3))
-    assert f"with probability at least {bound}, against this ego; it holds for no" in said.out
+    assert f"with probability at least {bound}, against this ego; it holds for no other" in said.out
     assert "constant: all 3 episodes came out the same: chance decides nothing" in said.out
     assert "its starts are kept" in said.err
     assert "was no test" not in said.err
     assert f"none of the 3 of {found}" in said.err
     assert list(tmp_path.iterdir()) == []
+
+
+def test_the_files_of_a_certificate_are_named(
+    found: Path, capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    """Those of each ego; the temporary ones of a certificate without -o are not."""
+    words = ["certify", str(found), "0", "--runs", "1", "--exit-zero"]
+    assert main(words) == Exit.OK
+    assert "wrote" not in capsys.readouterr().err
+    assert main([*words, "-o", str(tmp_path / "c.csv")]) == Exit.OK
+    files = f"{tmp_path / 'c-constant.csv'}, {tmp_path / 'c-constant.json'}"
+    assert f"cavsumo: wrote {files}" in capsys.readouterr().err
 
 
 def test_a_table_never_rounds_a_bound_up() -> None:

@@ -80,10 +80,11 @@ def test_each_report_of_the_readme_is_written(command: str, checkout: Path) -> N
             shutil.copy(checkout / "results.csv", checkout / name)
             shutil.copy(checkout / "results.json", checkout / f"{Path(name).stem}.json")
     done = cavsumo(checkout, *words)
-    assert (done.returncode, done.stderr) == (0, "")
+    assert done.returncode == 0
     for option, file in itertools.pairwise(words):
-        if option in ("-o", "--junit"):
+        if option in ("-o", "--junit", "--html"):
             assert (checkout / file).stat().st_size > 0
+            assert f"cavsumo: wrote {file}\n" in done.stderr
 
 
 @pytest.mark.parametrize("file", FILES)
@@ -104,4 +105,4 @@ def test_links_lead_somewhere(file: str) -> None:
 def test_the_agents_of_the_readme_are_those_that_there_are(checkout: Path) -> None:
     """The README's table of testers names every agent that is listed."""
     listed = {line.split()[0] for line in cavsumo(checkout, "agents").stdout.splitlines()}
-    assert listed == set(re.findall(r"^\| `([a-z][a-z-]+|policy:FILE)` \|", README, re.MULTILINE))
+    assert listed == set(re.findall(r"^\| `([a-z][a-z-]*|policy:FILE)` \|", README, re.MULTILINE))

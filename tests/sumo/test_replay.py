@@ -355,7 +355,7 @@ def test_a_trace_is_played_back_without_its_routes(
     said, n = capsys.readouterr(), len(recording.frames)
     verdict = recording.row["outcome"]
     assert said.out == f"run 1 (timing): {verdict}, {n} frames: the same, played back\n"
-    assert said.err == ""
+    assert said.err == f"cavsumo: wrote {pages[1]}\n"
     assert pages[0].read_bytes() == pages[1].read_bytes()
 
 

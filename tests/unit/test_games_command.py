@@ -128,9 +128,10 @@ def test_a_precision_beyond_floats_is_said(
     assert "floats are too coarse" in captured.err
 
 
-def test_pictures_are_drawn_and_the_same_bytes(tmp_path: Path) -> None:
+def test_pictures_are_drawn_and_the_same_bytes(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     """Tree and policy; a game too big for a tree is refused."""
-    pytest.importorskip("matplotlib")
     file = write("figure2_like", tmp_path)
     drawn = []
     for i in range(2):
@@ -138,6 +139,8 @@ def test_pictures_are_drawn_and_the_same_bytes(tmp_path: Path) -> None:
         words = ["--picture", str(tree), "--policy-picture", str(policy)]
         assert main(["game", "solve", file, *words]) == 0
         drawn.append((tree.read_bytes(), policy.read_bytes()))
+        named = f"cavsumo: wrote {tree}\ncavsumo: wrote {policy}\n"
+        assert capsys.readouterr().err.endswith(named)
     assert drawn[0] == drawn[1]
     assert min(map(len, drawn[0])) > 5000
     big = write("pursuit_line_7", tmp_path)

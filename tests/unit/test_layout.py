@@ -6,6 +6,7 @@ import ast
 import re
 import subprocess
 import sys
+import tomllib
 from collections import defaultdict
 from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
@@ -41,6 +42,9 @@ ROOT = {"__init__", "__main__", "errors"}
 
 HEAVY = {"numpy", "pandas", "scipy", "shapely", "libsumo", "sumolib", "pydantic", "rich"}
 HEAVY |= {"matplotlib", "osmium", "pyproj", "sumo", "jinja2", "traci"}
+
+OPTIONAL = {"IPython", "PIL", "dask", "distributed", "numba", "osmium", "pettingzoo", "pytest"}
+OPTIONAL |= {"traci"}  # libsumo brings it
 
 
 def sources() -> dict[str, Path]:
@@ -114,6 +118,15 @@ def loaded_by(module: str) -> set[str]:
         [sys.executable, "-c", code], capture_output=True, text=True, check=True, timeout=120
     )
     return set(done.stdout.split())
+
+
+def test_what_is_imported_is_required_or_has_an_extra() -> None:
+    """``pip install cavsumo`` brings all packages but those of the extras: pictures need none."""
+    project = tomllib.loads((PACKAGE.parent / "pyproject.toml").read_text("utf-8"))["project"]
+    core = {re.split(r"[\[>=]", word)[0] for word in project["dependencies"]}
+    names = {name.partition(".")[0] for module in SOURCES for name in imported(module)}
+    others = names - sys.stdlib_module_names - core - {"cavsumo", "markupsafe"}  # jinja2 brings it
+    assert others == OPTIONAL
 
 
 def test_the_root_holds_three_files() -> None:

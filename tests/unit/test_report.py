@@ -35,7 +35,8 @@ def says(capsys: pytest.CaptureFixture[str]) -> Says:
     def said(*words: str | Path) -> str:
         assert main(["report", *map(str, words)]) == 0
         found = capsys.readouterr()
-        assert found.err == ""
+        written = [words[words.index(o) + 1] for o in ("--junit", "-o") if o in words]
+        assert found.err == "".join(f"cavsumo: wrote {file}\n" for file in written)
         return found.out
 
     return said

@@ -9,7 +9,7 @@ import sys
 import tempfile
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 from rich.console import Console
 
@@ -30,9 +30,11 @@ from cavsumo.batch.playing import played
 from cavsumo.batch.preflight import CheckedBatch, checked
 from cavsumo.batch.prepared import PreparedBatch
 from cavsumo.batch.replay import Record, prepared_again, recorded
+from cavsumo.batch.summary import result_files
 from cavsumo.batch.trust import check_trust
 from cavsumo.cli.commands.run import announce, exit_status
 from cavsumo.cli.requests.certify import CertifyOptions
+from cavsumo.cli.steps import SlowSteps, say_written
 from cavsumo.egos import make_ego
 from cavsumo.errors import Exit, InputError
 from cavsumo.model.bodies import kind_named
@@ -48,9 +50,42 @@ FORMAT = 1  # of the JSON; raised when a key changes its meaning or goes
 WIDTH = 120
 
 
+class _Ready(NamedTuple):
+    """The prepared parts of a certificate, after all checks."""
+
+    batches: Sequence[CheckedBatch]
+    egos: Egos
+    seeds: Used
+    seed: int
+    subject: Subject
+    record: Record | None
+    manifest: Mapping[str, Any]
+
+
 def certify(order: CertifyOptions) -> int:
     """Play the test and print the bounds; all checks precede the first written file."""
     means = Means(order.jobs)
+    with _output(order) as output:
+        with SlowSteps(quiet=order.quiet) as steps:
+            ready = _ready(order, output, steps)
+        subject, seeds, seed = ready.subject, ready.seeds, ready.seed
+        _warn(ready)
+        if not order.quiet:
+            print(_first_lines(order, subject, seeds, seed), file=sys.stderr)
+        ended, interrupted = played(ready.batches, means, _manner(order), announce)
+        if interrupted:
+            left = " --resume goes on" if order.output else ""
+            print(f"cavsumo: interrupted, so nothing is certified;{left}", file=sys.stderr)
+            return Exit.INTERRUPTED
+        _show(order, certified(ended, ready.egos, order.confidence), subject, seeds, seed)
+        if order.output is not None:
+            say_written(map(result_files, ended), quiet=order.quiet)
+    return exit_status(ended, interrupted, order.exit_zero)
+
+
+def _ready(order: CertifyOptions, output: Path, steps: SlowSteps) -> _Ready:
+    """Check and prepare everything."""
+    steps.begin(f"reading {order.results}")
     plan, manifest = recorded_plan(order.results)
     egos = opponents(order.egos, order.ego_param, plan.scenario)
     check_trust(plan.scenario, order.results, _allowed(order), ego=not order.egos)
@@ -59,38 +94,38 @@ def certify(order: CertifyOptions) -> int:
     subject, record = _subject(order, plan, manifest)
     seed = fresh_seed(order.seed, order.runs, seeds.seeds)
     parts = _parts(order, manifest, subject, egos, seed)
-    manner = Manner(
+    _check_outputs(order, parts)
+    steps.begin("reading the network and looking for starts")
+    places = present_paths(plan, manifest, order.results)
+    ready = checked(parts, output, _manner(order), places)
+    batches = [_marked(b, order, subject) for b in ready]
+    _check_starts(batches, subject, record)
+    return _Ready(batches, egos, seeds, seed, subject, record, manifest)
+
+
+def _manner(order: CertifyOptions) -> Manner:
+    """How existing results are treated, and what is printed."""
+    return Manner(
         resume=order.resume,
         overwrite=order.overwrite,
         quiet=order.quiet,
         exit_zero=order.exit_zero,
     )
-    with _output(order) as output:
-        batches = [_marked(b, order, subject) for b in checked(parts, output, manner, places)]
-        _check_batches(order, batches, subject, record)
-        _warn(manifest, batches[0].prepared, record, seeds, subject)
-        if not order.quiet:
-            print(_first_lines(order, subject, seeds, seed), file=sys.stderr)
-        ended, interrupted = played(batches, means, manner, announce)
-        if interrupted:
-            left = " --resume goes on" if order.output else ""
-            print(f"cavsumo: interrupted, so nothing is certified;{left}", file=sys.stderr)
-            return Exit.INTERRUPTED
-        _show(order, certified(ended, egos, order.confidence), subject, seeds, seed)
-    return exit_status(ended, interrupted, order.exit_zero)
 
 
 # Checked
 
 
-def _check_batches(
-    order: CertifyOptions, batches: Sequence[CheckedBatch], subject: Subject, record: Record | None
-) -> None:
-    """Refuse to overwrite the results that are read, and starts that another ego would change."""
+def _check_outputs(order: CertifyOptions, parts: Sequence[Part]) -> None:
+    """Refuse to overwrite the results that are read."""
     read = {file.resolve() for file in (order.results, *order.apart)}
-    for batch in batches:
-        if batch.output.resolve() in read:
-            raise InputError(f"output {str(batch.output)!r}: is one of the results")
+    for output in [] if order.output is None else [part.output(order.output) for part in parts]:
+        if output.resolve() in read:
+            raise InputError(f"output {str(output)!r}: is one of the results")
+
+
+def _check_starts(batches: Sequence[CheckedBatch], subject: Subject, record: Record | None) -> None:
+    """Refuse starts that another ego would change."""
     for batch in batches if subject.told else ():
         for start in subject.told:
             recorded_start(batch.prepared.site, start)
@@ -164,14 +199,10 @@ def _output(order: CertifyOptions) -> Iterator[Path]:
 # Said
 
 
-def _warn(
-    manifest: Mapping[str, Any],
-    prepared: PreparedBatch,
-    record: Record | None,
-    seeds: Used,
-    subject: Subject,
-) -> None:
+def _warn(ready: _Ready) -> None:
     """Print warnings about the certificate on stderr."""
+    manifest, record, seeds = ready.manifest, ready.record, ready.seeds
+    prepared, subject = ready.batches[0].prepared, ready.subject
     for part, now in (("versions", prepared.versions), ("sha256", prepared.checksums)):
         was = manifest.get(part) or {}
         for name in sorted(was.keys() & now.keys()):

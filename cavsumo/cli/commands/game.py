@@ -21,7 +21,8 @@ from rich.table import Table
 from rich.text import Text
 
 from cavsumo.cli.requests.game import SolveOptions
-from cavsumo.errors import Exit, InputError
+from cavsumo.cli.steps import say_written
+from cavsumo.errors import Exit
 from cavsumo.games.approach import Tell
 from cavsumo.games.files import read_game
 from cavsumo.games.model import Game
@@ -58,6 +59,7 @@ def solve_file(order: SolveOptions) -> int:
         return Exit.NOT_RUN
     for painter, file in painters:
         painter(game, verdict, solution, file)
+    say_written([file for _, file in painters], quiet=order.quiet)
     show = _json if order.as_json else _table
     print(show(order, game, verdict, solution))
     return _status(order, verdict, solution)
@@ -89,19 +91,14 @@ def _status(order: SolveOptions, verdict: Solvability, solution: Solution | None
 
 
 def _painters(order: SolveOptions) -> list[tuple[Any, Path]]:
-    """The functions that draw, with their files; InputError if that is impossible."""
-    wanted = [("--picture", order.picture, "draw_tree")]
-    wanted += [("--policy-picture", order.policy_picture, "draw_policy")]
+    """The functions that draw, with their files."""
+    wanted = [(order.picture, "draw_tree"), (order.policy_picture, "draw_policy")]
     found = []
-    for option, file, name in wanted:
+    for file, name in wanted:
         if file is None:
             continue
-        try:
-            from cavsumo.games import pictures
-        except ImportError:
-            raise InputError(
-                f"{option} needs the package matplotlib: pip install 'cavsumo[plot]'"
-            ) from None
+        from cavsumo.games import pictures
+
         found.append((getattr(pictures, name), file))
     return found
 

@@ -13,9 +13,10 @@ from pathlib import Path
 
 from cavsumo import __version__
 from cavsumo.cli.requests.import_osm import ImportOptions, log_file
+from cavsumo.cli.steps import SlowSteps, say_written
 from cavsumo.errors import Exit, InputError
 from cavsumo.network.facts import Facts, facts
-from cavsumo.network.osm.extract import Box, find_roads, parse_box, write_roads
+from cavsumo.network.osm.extract import Box, RoadExtract, find_roads, parse_box, write_roads
 from cavsumo.network.osm.handedness import Side, side, warning
 from cavsumo.network.osm.netconvert import (
     ODBL,
@@ -48,12 +49,30 @@ ZEBRA_OPTIONS = (
 
 def import_osm(order: ImportOptions) -> int:
     """Make the network; files are written only after success."""
-    box = None if order.bbox is None else parse_box(order.bbox)
-    roads = find_roads(order.source, box)
-    found = side(roads.hints, box or roads.bounds or (0, 0, 0, 0))
-    about = list(_about_side(found, order.left_hand))
-    if order.left_hand is None:
-        order = dataclasses.replace(order, left_hand=found.left and found.certain)
+    with SlowSteps() as steps:
+        steps.begin(f"reading {order.source}")
+        box = None if order.bbox is None else parse_box(order.bbox)
+        roads = find_roads(order.source, box)
+        found = side(roads.hints, box or roads.bounds or (0, 0, 0, 0))
+        about = list(_about_side(found, order.left_hand))
+        if order.left_hand is None:
+            order = dataclasses.replace(order, left_hand=found.left and found.certain)
+        steps.begin("making a network with netconvert")
+        network, said, made = _converted(order, box, roads)
+    log = log_file(order.output)
+    _publish(order, network, "".join(f"{line}\n" for line in said), log)
+    remarks = [*about, *(f"note: {note}" for note in made.notes)]
+    for line in [*remarks, *warning_summary(said, log)]:
+        print(line if line.startswith(" ") else f"cavsumo: {line}", file=sys.stderr)
+    say_written([log])
+    print(_what_was_made(order.output, made))
+    return Exit.OK
+
+
+def _converted(
+    order: ImportOptions, box: Box | None, roads: RoadExtract
+) -> tuple[str, list[str], Facts]:
+    """The network, netconvert's output, and the facts of the network."""
     with tempfile.TemporaryDirectory(prefix="cavsumo-") as name:
         folder = Path(name)
         with (folder / EXTRACT).open("w", encoding="utf-8", newline="\n") as stream:
@@ -63,14 +82,7 @@ def import_osm(order: ImportOptions) -> int:
         said += _zebra(folder, order.time_limit_s) if order.zebra else []
         network = _with_notice((folder / NET).read_text(encoding="utf-8"), order, options)
         (folder / NET).write_text(network, encoding="utf-8", newline="\n")
-        made = facts(read_network(folder / NET))
-    log = log_file(order.output)
-    _publish(order, network, "".join(f"{line}\n" for line in said), log)
-    remarks = [*about, *(f"note: {note}" for note in made.notes)]
-    for line in [*remarks, *warning_summary(said, log)]:
-        print(line if line.startswith(" ") else f"cavsumo: {line}", file=sys.stderr)
-    print(_what_was_made(order.output, made))
-    return Exit.OK
+        return network, said, facts(read_network(folder / NET))
 
 
 def _about_side(found: Side, asked: bool | None) -> Iterator[str]:

@@ -16,9 +16,9 @@ from rich.table import Table
 from rich.text import Text
 
 from cavsumo.cli.requests.inspect import InspectOptions
-from cavsumo.cli.steps import SlowSteps
+from cavsumo.cli.steps import SlowSteps, say_written
 from cavsumo.egos.base import EGO_KIND
-from cavsumo.errors import Exit, InputError, NetworkError
+from cavsumo.errors import Exit, NetworkError
 from cavsumo.model.named_networks import network_file
 from cavsumo.network.facts import Facts, facts
 from cavsumo.network.inspection import (
@@ -39,12 +39,13 @@ WIDTH = 120
 def inspect(look: InspectOptions) -> int:
     """Describe a network."""
     draw = _drawing(look.picture)
-    with SlowSteps(quiet=draw is None) as steps:
+    with SlowSteps() as steps:
         found, here, junctions = _seen(look, steps)
         if draw is not None:
             steps.begin(f"drawing {look.picture}")
             unwritten = draw(here, junctions[0] if junctions else None, look.picture)
             _note_unwritten(unwritten)
+    say_written([look.picture])
     if look.as_json:
         print(json.dumps(as_json(look.net, found, junctions), ensure_ascii=not _utf8(), indent=2))
     else:
@@ -84,15 +85,11 @@ def _junctions(here: InspectedNetwork, look: InspectOptions) -> list[Junction]:
 
 
 def _drawing(picture: Path | None) -> Any:
-    """The function that draws, if a picture is requested; InputError if it is impossible."""
+    """The function that draws, imported if a picture is requested."""
     if picture is None:
         return None
-    try:
-        from cavsumo.network.drawing.picture import draw
-    except ImportError:
-        raise InputError(
-            "--picture needs the package matplotlib: pip install 'cavsumo[plot]'"
-        ) from None
+    from cavsumo.network.drawing.picture import draw
+
     return draw
 
 

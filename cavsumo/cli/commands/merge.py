@@ -8,12 +8,15 @@ from pathlib import Path
 
 from cavsumo.batch.merge import merged
 from cavsumo.batch.summary import summarise
+from cavsumo.cli.steps import SlowSteps
 from cavsumo.errors import Exit
 
 
 def merge(parts: Sequence[Path], output: Path, overwrite: bool, quiet: bool) -> int:
     """Merge the parts and print their summary."""
-    whole = merged(parts, output, overwrite=overwrite, warn=_warn)
+    with SlowSteps(quiet=quiet) as steps:
+        steps.begin(f"merging {len(parts)} results into {output}")
+        whole = merged(parts, output, overwrite=overwrite, warn=_warn)
     if not quiet:
         summarise([whole])
     return Exit.OK

@@ -2,23 +2,17 @@
 
 from __future__ import annotations
 
+import functools
 import sys
 from pathlib import Path
 
 from cavsumo.batch.located import located
-from cavsumo.batch.playback import NOT_PLAYED_BACK, for_playback, played_back
 from cavsumo.batch.prepared import PreparedBatch, manifest
-from cavsumo.batch.replay import (
-    Record,
-    compare,
-    prepared_again,
-    recorded,
-    recorded_alone,
-    replayed,
-)
+from cavsumo.batch.replay import Record, recorded, recorded_alone
+from cavsumo.batch.replaying import play_again, play_back
 from cavsumo.batch.shown import shown_site
-from cavsumo.batch.worker import Worker
 from cavsumo.cli.requests.replay import TRACE, ReplayOptions
+from cavsumo.cli.steps import SlowSteps, say_written
 from cavsumo.errors import Exit, InputError
 from cavsumo.interop.fcd import write_fcd
 from cavsumo.network.site import Site
@@ -34,22 +28,43 @@ def replay(file: Path, wanted: ReplayOptions) -> int:
         check_gui(wanted.delay)
     if wanted.playback and wanted.recorded:
         raise InputError("replay: --recorded plays nothing and --playback plays; name one of them")
-    found = _found(file, wanted)
-    record = for_playback(found) if wanted.playback else found
-    if not wanted.recorded or wanted.shown:
-        record = located(record, wanted.net, wanted.routes, shown=wanted.recorded)
+    with SlowSteps() as steps:
+        record = _found(file, wanted)
+        steps.begin(f"replaying run {record.run}")
+        record, trace, site = _taken(record, wanted)
+        if wanted.shown and trace is None:
+            raise InputError(
+                f"replay: run {record.run} ended in an error, there is nothing to show"
+            )
+        if trace is not None and site is not None:
+            _write(site, record, trace, wanted)
+    say_written([wanted.fcd, wanted.html])
+    if wanted.gui and trace is not None and site is not None:
+        from cavsumo.interop.gui import show
+
+        show(trace, record.plan.scenario, site, wanted.delay)
+    return Exit.OK
+
+
+def _taken(record: Record, wanted: ReplayOptions) -> tuple[Record, Trace | None, Site | None]:
+    """The episode as recorded, played back or played again: its record, trace and place.
+
+    There is no trace after an error, and no place where nothing is shown.
+    """
+    here = functools.partial(located, net=wanted.net, routes=wanted.routes, shown=wanted.recorded)
     if wanted.recorded:
+        record = here(record) if wanted.shown else record
         trace: Trace | None = _recorded_trace(record)
         site = shown_site(record.plan, trace) if wanted.shown else None
     elif wanted.playback:
-        trace, site = record.trace, _played_back(record)
+        record, site = play_back(record, here, _say_changes)
+        trace = record.trace
+        _say(record, "the same, played back")
     else:
-        trace, site = _played(record)
-    if wanted.shown and trace is None:
-        raise InputError(f"replay: run {record.run} ended in an error, there is nothing to show")
-    if trace is not None and site is not None:
-        _show(site, found, trace, wanted)
-    return Exit.OK
+        record = here(record)
+        trace, site = play_again(record, _say_changes)
+        _say(record, "the same")
+    return record, trace, site
 
 
 def _found(file: Path, wanted: ReplayOptions) -> Record:
@@ -69,32 +84,10 @@ def _recorded_trace(record: Record) -> Trace:
     return record.trace
 
 
-def _played(record: Record) -> tuple[Trace | None, Site]:
-    """The trace of the episode played again, None where an error left none; and where it was."""
-    prepared = _prepared(record)
-    with Worker(prepared) as worker:
-        again = replayed(worker, record)
-    compare(record, again)
-    _say(record, "the same")
-    return again.trace, prepared.site
-
-
-def _played_back(record: Record) -> Site:
-    """Play an episode back; where it was."""
-    prepared = _prepared(record)
-    with Worker(prepared) as worker:
-        again = played_back(worker, record)
-    compare(record, again, NOT_PLAYED_BACK)
-    _say(record, "the same, played back")
-    return prepared.site
-
-
-def _prepared(record: Record) -> PreparedBatch:
-    """The prepared batch of a record; stderr names the changes since it was recorded."""
-    prepared = prepared_again(record)
+def _say_changes(record: Record, prepared: PreparedBatch) -> None:
+    """Print on stderr what has changed since an episode was recorded."""
     for change in changes(record.origin, manifest(prepared)):
         print(f"cavsumo: {change}", file=sys.stderr)
-    return prepared
 
 
 def _say(record: Record, how: str) -> None:
@@ -105,15 +98,11 @@ def _say(record: Record, how: str) -> None:
     print(f"run {record.run} ({row['agent']}): {row['outcome']}, {compared}: {how}")
 
 
-def _show(site: Site, record: Record, trace: Trace, wanted: ReplayOptions) -> None:
-    """Write and show the requested output."""
+def _write(site: Site, record: Record, trace: Trace, wanted: ReplayOptions) -> None:
+    """Write the requested files."""
     if wanted.fcd is not None:
         write_fcd(trace, wanted.fcd)
     if wanted.html is not None:
         from cavsumo.report.pages.replay.page import write_page
 
         write_page(record, trace, site, wanted.html)
-    if wanted.gui:
-        from cavsumo.interop.gui import show
-
-        show(trace, record.plan.scenario, site, wanted.delay)

@@ -16,6 +16,7 @@ from cavsumo.batch.playing import played
 from cavsumo.batch.preflight import CheckedBatch, prepared_batches
 from cavsumo.batch.summary import summarise
 from cavsumo.batch.tally import found_by
+from cavsumo.cli.steps import SlowSteps
 from cavsumo.egos import make_ego
 from cavsumo.errors import Exit
 from cavsumo.model.study import Part
@@ -28,7 +29,9 @@ def run(settings: Mapping[str, Any], output: Path, means: Means, manner: Manner)
 
 def run_study(batches: Sequence[PlannedBatch], means: Means, manner: Manner) -> int:
     """Play one batch after another; all are checked before anything is written."""
-    checked = prepared_batches(batches, manner)
+    with SlowSteps(quiet=manner.quiet) as steps:
+        steps.begin("reading the network and looking for starts")
+        checked = prepared_batches(batches, manner)
     for batch in checked:
         if batch.replaced:
             print(_replacement(batch), file=sys.stderr)

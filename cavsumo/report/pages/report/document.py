@@ -10,10 +10,12 @@ from urllib.parse import quote
 
 from markupsafe import Markup
 
+from cavsumo.batch.sentences import many
 from cavsumo.batch.summary import percent
 from cavsumo.report.analysis import Report
 from cavsumo.report.cells import TOPICS, Table, number
 from cavsumo.report.compare import WORDS, PairedComparison
+from cavsumo.report.order import Tell, untold
 from cavsumo.report.pages.report import words
 from cavsumo.report.pages.report.links import (
     LinkedRun,
@@ -62,15 +64,27 @@ class Plot(NamedTuple):
     note: str = ""
 
 
-def write_report(report: Report, file: Path, replays: int) -> list[str]:
-    """Write the page, and beside it those of some replays; raises InputError.
+class WrittenPage(NamedTuple):
+    """A page that was written.
 
-    Returns sentences that say which pages cannot be made, and why; the page has them too.
+    Attributes:
+        files: names of what was written.
+        problems: sentences that say which pages of replays cannot be made, and why; the page has
+            them too.
+    """
+
+    files: Sequence[str]
+    problems: Sequence[str]
+
+
+def write_report(report: Report, file: Path, replays: int, tell: Tell = untold) -> WrittenPage:
+    """Write the page, and beside it those of some replays; raises InputError.
 
     Args:
         replays: how many failures are shown as pages of their own; of the tests that the ego
             passed half as many.
     """
+    tell("drawing plots and maps", "")
     played = scenes(report.evidence.batches)
     failures, tests = chosen(report, replays)
     failures = with_pages(failures, replays, report, played)
@@ -80,9 +94,10 @@ def write_report(report: Report, file: Path, replays: int) -> list[str]:
     problems += unshown(tests, replays // 2, report, played)
     problems = list(dict.fromkeys(problems))
     text = page(report, played, failures, tests, folder.name, problems)
-    write_pages([*failures, *tests], report.evidence.batches, played, folder)
+    pages = write_pages([*failures, *tests], report.evidence.batches, played, folder, tell)
     write(text, file)
-    return problems
+    written = [str(file), *([f"{folder}/ ({many(pages, 'page')})"] if pages else [])]
+    return WrittenPage(written, problems)
 
 
 def page(

@@ -17,6 +17,7 @@ from cavsumo.batch.replay import Record
 from cavsumo.errors import InputError
 from cavsumo.report.analysis import Report
 from cavsumo.report.load import Batch
+from cavsumo.report.order import Tell
 from cavsumo.report.pages.replay.page import write_page
 from cavsumo.report.pages.report.scenes import BatchPlace
 from cavsumo.results.failures import ORDER, failure_kind
@@ -141,12 +142,20 @@ def _name(look: LinkedRun, several: bool) -> str:
 
 
 def write_pages(
-    looks: Sequence[LinkedRun], batches: Sequence[Batch], scenes: Sequence[BatchPlace], folder: Path
-) -> None:
-    """Write the pages of the runs that have a page name into a folder; raises InputError."""
+    looks: Sequence[LinkedRun],
+    batches: Sequence[Batch],
+    scenes: Sequence[BatchPlace],
+    folder: Path,
+    tell: Tell,
+) -> int:
+    """Write the pages of the runs that have a page name into a folder; returns their number.
+
+    Raises InputError.
+    """
     wanted = [look for look in looks if look.page]
     if not wanted:
-        return
+        return 0
+    written = 0
     try:
         folder.mkdir(exist_ok=True)
     except OSError as error:
@@ -156,7 +165,10 @@ def write_pages(
         here = {str(look.run): look for look in wanted if look.batch == i}
         for _, row in whole_lines(batches[i].csv_file):
             if row is not None and row["run"] in here:
+                written += 1
+                tell("writing replay pages", f"{written} of {len(wanted)}")
                 _write_page(here[row["run"]], row, batches[i], scene, folder)
+    return written
 
 
 def _write_page(
