@@ -12,7 +12,7 @@ from __future__ import annotations
 import math
 import os
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
@@ -255,7 +255,8 @@ class World:
     @contextmanager
     def _listening(self) -> Iterator[None]:
         """Turn SUMO's refusals into SimulationError with the message that it prints on stderr."""
-        self._heard.truncate(0)
+        with suppress(OSError):  # in a fork it leads nowhere
+            self._heard.truncate(0)
         stderr = os.dup(2)
         os.dup2(self._heard.fileno(), 2)
         try:
