@@ -136,6 +136,8 @@ def refuse(loop: EpisodeLoop, how: Continuation) -> None:
     setup = loop.setup
     if loop.over:
         raise BranchError("the episode is over: nothing can follow in a branch")
+    if loop.replaced:
+        raise BranchError("another episode has begun in the simulation: nothing is left to branch")
     if setup.ego.outside or (how.ego is not None and how.ego.outside):
         raise BranchError(
             "an ego outside of this process (exec:, tcp:) has one conversation, which a branch "

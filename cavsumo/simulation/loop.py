@@ -123,6 +123,7 @@ class EpisodeLoop:
             setup, agents, seed, record, simulation, demand
         )
         self.placed, self.snapshot = begun, begun.snapshot
+        self._place = setup.world.begun
         self._show(self.snapshot)
         self._rewards = RewardMonitor(self.scene, setup.teams)
         self._episode = Episode(Judgement(""), starts=begun.starts, waited=begun.waited)
@@ -204,6 +205,11 @@ class EpisodeLoop:
             self.snapshot = setup.world.show_everybody()
             self._show(self.snapshot)
         self._keep(record)
+
+    @property
+    def replaced(self) -> bool:
+        """Whether another episode has begun in its simulation, so that it cannot continue."""
+        return self.setup.world.begun != self._place
 
     @property
     def contacts(self) -> ContactMonitor:

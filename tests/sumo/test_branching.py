@@ -260,6 +260,14 @@ def test_an_episode_that_is_over_has_no_branches(begin: Begin) -> None:
         branch(loop, Continuation())
 
 
+def test_an_episode_whose_simulation_another_has_is_refused(begin: Begin) -> None:
+    """It would be a branch of the other one."""
+    loop = begin("pedestrians")
+    begin("pedestrians")
+    with pytest.raises(BranchError, match="another episode has begun"):
+        branch(loop, Continuation())
+
+
 def test_an_ego_that_steers_itself_is_not_handed_to_one_that_does_not(begin: Begin) -> None:
     """SUMO would have to find its way back to a lane."""
     from test_avoidable import Steering
