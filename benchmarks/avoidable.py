@@ -71,9 +71,9 @@ def line(found: list[Found]) -> Iterator[str]:
     first = found[0]
     yield f"{first.tests:5}  {first.failures:8}"
     for one in found:
-        judged: Rate = rate(one.preventable[True], one.preventable.total())
+        judged: Rate = rate(one.preventable, one.preventable + one.unpreventable)
         share = f"{judged.count} {percent(judged.value)} {interval(judged)}" if judged.total else ""
-        yield f" {share:>28}   {one.preventable[False]:3}"
+        yield f" {share:>28}   {one.unpreventable:3}"
 
 
 if __name__ == "__main__":

@@ -9,12 +9,13 @@ from __future__ import annotations
 
 import argparse
 import csv
-import subprocess
 import sys
 import tempfile
 from collections import Counter
 from pathlib import Path
 
+from cavsumo import cli
+from cavsumo.errors import Exit
 from cavsumo.results.statistics import rate
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -55,8 +56,8 @@ def play(net: str, ego: str, file: Path, *words: object) -> None:
     """A batch."""
     base = ("run", "--net", ROOT / "networks" / f"{net}.net.xml", "--ego", ego, "-o", file)
     quiet = ("--trace", "none", "-q", "--exit-zero", "--deadline", 600)
-    command = [sys.executable, "-m", "cavsumo", *map(str, (*base, *quiet, *words))]
-    subprocess.run(command, check=True)
+    if cli.main([*map(str, (*base, *quiet, *words))]) != Exit.OK:
+        sys.exit("a batch could not be played")
 
 
 def line(where: str, tester: str, file: Path) -> None:

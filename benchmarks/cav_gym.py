@@ -130,7 +130,7 @@ def play(testers: int, agents: tuple[str, ...], runs: int) -> list[dict[str, obj
     """The rows of a cell."""
     made = prepared(testers, agents, runs)
     with local_executor(2) as executor:
-        return [outcome.row for outcome, _ in run_batch(made, executor, made.plan.todo())]
+        return [answer.outcome.row for answer in run_batch(made, executor, made.plan.todo())]
 
 
 def forceable_episode(plan: BatchPlan, site: Site, run: int) -> bool:

@@ -53,7 +53,7 @@ def prepared(agent: str, runs: int, params: dict[str, str]) -> PreparedBatch:
 def play(made: PreparedBatch, jobs: int) -> list[Row]:
     """The rows of a batch."""
     with local_executor(jobs) as executor:
-        return [outcome.row for outcome, _ in run_batch(made, executor, made.plan.todo())]
+        return [answer.outcome.row for answer in run_batch(made, executor, made.plan.todo())]
 
 
 def table(rows: list[Row], possible: list[bool]) -> None:

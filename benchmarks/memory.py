@@ -85,7 +85,8 @@ def real(episodes: int, file: Path) -> None:
         while process.poll() is None and lines(file) < mark:
             time.sleep(0.05)
         sizes = [resident(pid) for pid in (process.pid, *children(process.pid))]
-        print(f"{lines(file):7} episodes: parent {sizes[0]:6.1f} MB, worker {sizes[1]:6.1f} MB")
+        worker = f"{sizes[1]:6.1f} MB" if len(sizes) > 1 else "gone"
+        print(f"{lines(file):7} episodes: parent {sizes[0]:6.1f} MB, worker {worker}")
     process.wait()
 
 

@@ -13,6 +13,7 @@ from typing import Any
 import pytest
 from inline import played_here
 from shapely.geometry import LineString, box
+from sites import derived_once
 from support import CHROMIUM, LAPTOP, OPTIONS, ROOT, prepared_at
 
 from cavsumo.agents.base import Scene
@@ -46,6 +47,13 @@ def _own_cache(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
     """Solutions of games are kept for these tests only."""
     with pytest.MonkeyPatch.context() as patched:
         patched.setenv("XDG_CACHE_HOME", str(tmp_path_factory.mktemp("cache")))
+        yield
+
+
+@pytest.fixture(scope="session", autouse=True)
+def _sites() -> Iterator[None]:
+    """What is known of a network that comes with cavsumo is derived once."""
+    with derived_once():
         yield
 
 

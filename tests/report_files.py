@@ -17,7 +17,7 @@ HELD, FAILED, UNFAIR, NOTHING, ERROR = "held", "violated", "unfair", "not_trigge
 
 def plan(**settings: Any) -> dict[str, Any]:
     """A plan as a manifest has it."""
-    own = {"agents": ["random", "timing"], "runs": 4, "seed": 1}
+    own = {"agents": ["random", "timing"], "runs": 4, "seed": 1, "reference": "none"}
     own |= {k: v for k, v in settings.items() if k in (*own, "first", "until_tests", "params")}
     scenario = {k: v for k, v in settings.items() if k not in own}
     return {"scenario": {"net": "gone/place.net.xml", **scenario}, **own}

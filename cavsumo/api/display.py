@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from html import escape
 from typing import TYPE_CHECKING, Any
 
+from cavsumo.batch import sentences
 from cavsumo.batch.replay import Record
 from cavsumo.batch.summary import percent
 from cavsumo.batch.tally import Found, Tally
@@ -19,7 +20,7 @@ if TYPE_CHECKING:
     import pandas
 
 MOST = 10  # failures in a notebook; ``failures`` has all
-AGENTS = ("agent", "episodes", "tests", "rate", "failures", "preventable", "unfair", "errors")
+AGENTS = ("agent", "episodes", "preventable", "failures", "tests", "rate", "unfair", "errors")
 FAILURES = ("run", "agent", "assertion", "tester", "violation_time_s", "avoidable")
 
 
@@ -30,12 +31,14 @@ class ResultsSummary:
     Attributes:
         scenario, tally: the scenario and the counts.
         failures: the rows of failures, preventable ones first.
-        place: their file, and the status of the batch.
+        judged: whether a reference driver judged them.
+        place: where they lie, and how the batch stands.
     """
 
     scenario: Scenario
     tally: Tally
     failures: pandas.DataFrame
+    judged: bool
     place: str
 
 
@@ -46,8 +49,11 @@ def results_text(summary: ResultsSummary) -> str:
 
 def results_html(summary: ResultsSummary) -> str:
     """Results as a table of the agents, and one of the first failures."""
-    agents = [_agent(name, found) for name, found in summary.tally.agents.items()]
-    parts = [f"<p>{escape(_headline(summary))}</p>", _table(AGENTS, agents)]
+    judged, agents = summary.judged, summary.tally.agents.items()
+    lines = [_agent(name, found, judged) for name, found in agents]
+    parts = [f"<p>{escape(_headline(summary))}</p>", _table(AGENTS, lines)]
+    if warning := sentences.frozen(summary.tally.all):
+        parts.append(f"<p>{escape(warning)}</p>")
     if total := len(summary.failures):
         more = f", {MOST} of {total}" if total > MOST else ""
         parts.append(f"<p>Failures, preventable ones first{more}:</p>")
@@ -72,19 +78,18 @@ def _headline(summary: ResultsSummary) -> str:
     """The scenario, the results and their file."""
     scenario, found = summary.scenario, summary.tally.all
     said = f"{summary.tally.rows} episodes on {scenario.name}, ego {scenario.ego}: "
-    said += f"{found.tests} tests, {found.failures} failures"
-    if judged := found.preventable.total():
-        said += f" ({found.preventable[True]} of {judged} judged preventable)"
-    said += f", {found.errors} errors" if found.errors else ""
+    said += sentences.failures(found, summary.judged)
+    said += f" in {sentences.many(found.tests, 'test')}"
+    said += f", {sentences.many(found.errors, 'error')}" if found.errors else ""
+    said += f", the ego froze in {found.frozen.total()}" if found.frozen else ""
     return f"{said}; {summary.place}" if summary.place else said
 
 
-def _agent(name: str, found: Found) -> list[str]:
+def _agent(name: str, found: Found, judged: bool) -> list[str]:
     """A line of the table of agents."""
-    judged = found.preventable.total()
-    preventable = f"{found.preventable[True]} of {judged}" if judged else ""
+    preventable = str(found.preventable) if judged else ""
     rate = percent(found.rate("tests").value)
-    counts = [str(found.episodes), str(found.tests), rate, str(found.failures), preventable]
+    counts = [str(found.episodes), preventable, str(found.failures), str(found.tests), rate]
     return [name, *counts, str(found.unfair), str(found.errors)]
 
 

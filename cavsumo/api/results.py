@@ -22,6 +22,7 @@ from cavsumo.model.scenario import BatchPlan, Scenario
 from cavsumo.report.files import write_report_files
 from cavsumo.report.order import ReportOptions
 from cavsumo.results.columns import COLUMNS
+from cavsumo.results.failures import preventable_first
 from cavsumo.results.reading import COMPLETE, read_results, whole_lines
 from cavsumo.results.recorded_plan import recorded_plan
 
@@ -87,8 +88,7 @@ class Results:
     def failures(self) -> pandas.DataFrame:
         """The rows of failures: preventable ones first, then those that were not judged."""
         found = self.rows[self.rows["outcome"] == "violated"]
-        order = found["avoidable"].map({1: 0, 0: 2}).fillna(1).sort_values(kind="stable")
-        return found.loc[order.index]
+        return found.loc[[row["run"] for row in preventable_first(found.to_dict("records"))]]
 
     @property
     def plan(self) -> BatchPlan:
@@ -169,11 +169,11 @@ class Results:
     @cached_property
     def _summary(self) -> ResultsSummary:
         """The summary of the results."""
-        tally = Tally()
+        tally, judged = Tally(), self.plan.reference != "none"
         for _, row in whole_lines(self.file):
             if row is not None:
                 tally.add(row)
-        return ResultsSummary(self.scenario, tally, self.failures, self._place)
+        return ResultsSummary(self.scenario, tally, self.failures, judged, self._place)
 
     @property
     def _place(self) -> str:

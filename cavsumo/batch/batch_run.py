@@ -119,8 +119,7 @@ class BatchRun:
     def end(self) -> None:
         """Complete the manifest."""
         self._note_outputs()
-        facts = {"episodes": self.tally.rows, "counts": self.tally.all.outcomes}
-        self.recorder.finish(self.status, facts | self._knowledge.facts())
+        self.recorder.finish(self.status, self.tally.facts() | self._knowledge.facts())
 
     def _note_outputs(self) -> bool:
         """Record the files that the ego has written in the manifest; returns whether any is new."""

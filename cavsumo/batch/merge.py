@@ -7,13 +7,13 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
+from cavsumo.batch.ended import Ended
 from cavsumo.batch.preflight import check_kept
 from cavsumo.batch.prepared import OUTPUTS
-from cavsumo.batch.summary import Ended
 from cavsumo.batch.tally import Tally
 from cavsumo.errors import ResultsError
 from cavsumo.results.provenance import differences
-from cavsumo.results.reading import ego_log_name, inside, whole_lines
+from cavsumo.results.reading import check_apart, ego_log_name, inside, whole_lines
 from cavsumo.results.recorded_plan import recorded_plan
 from cavsumo.results.rows import Outcome
 from cavsumo.results.writing import Recorder
@@ -25,8 +25,7 @@ Numbered = tuple[int, int, dict[str, str]]  # run, which part, row
 
 def merged(parts: Sequence[Path], output: Path, *, overwrite: bool) -> Ended:
     """Check that the parts are complete, then write the whole; raises ResultsError if not."""
-    if output.resolve() in [part.resolve() for part in parts]:
-        raise ResultsError(f"output {str(output)!r}: is one of the parts")
+    check_apart(output, parts)
     whole = _whole_manifest(parts)
     _check_whole(parts, whole)
     if not overwrite:
@@ -37,9 +36,9 @@ def merged(parts: Sequence[Path], output: Path, *, overwrite: bool) -> Ended:
         for run, part, row in _in_order(parts):
             files = _trace_of(parts[part], row), _log_of(parts[part], run)
             tally.add(recorder.write(Outcome(row | {"run": run}, *files)))
-        facts = {"episodes": tally.rows, "counts": tally.all.outcomes}
+        facts = tally.facts()
         recorder.finish("finished", facts)
-    return Ended("", output, tally, recorder.traces)
+    return Ended("", output, tally, recorder.traces, str(whole["plan"].get("reference", "none")))
 
 
 def _whole_manifest(parts: Sequence[Path]) -> dict[str, Any]:

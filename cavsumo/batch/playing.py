@@ -6,13 +6,13 @@ from collections.abc import Callable, Sequence
 from concurrent.futures import Executor
 
 from cavsumo.batch.batch_run import BatchRun
+from cavsumo.batch.ended import Ended
 from cavsumo.batch.executors import opened
 from cavsumo.batch.interrupts import Interrupts
 from cavsumo.batch.manner import Manner, Means
 from cavsumo.batch.preflight import CheckedBatch
 from cavsumo.batch.prepared import PreparedBatch
 from cavsumo.batch.stopping import looks_at_rows
-from cavsumo.batch.summary import Ended
 from cavsumo.batch.worker import try_out
 from cavsumo.egos.ego_files import OutputWatch
 from cavsumo.errors import CavsumoError, InputError
@@ -83,6 +83,7 @@ def _play(
         batch.output,
         batch_run.tally,
         recorder.traces,
+        prepared.plan.reference,
         sequential=looks_at_rows(prepared.plan),
         shared=prepared.plan.reset == "shared",
         cut_short=batch_run.cut_short or batch_run.status == "interrupted",

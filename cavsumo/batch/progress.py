@@ -12,6 +12,7 @@ from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, TextColumn, TimeRemainingColumn
 from rich.progress import Progress as Bar
 
+from cavsumo.batch.sentences import many
 from cavsumo.batch.tally import Tally
 
 
@@ -100,8 +101,10 @@ class _NotebookBar:
 def _found(tally: Tally) -> str:
     """The results so far."""
     found = tally.all
-    said = f"{found.tests} tests, {found.failures} failures"
-    return f"{said}, {found.errors} errors" if found.errors else said
+    judged = bool(found.preventable or found.unpreventable)
+    failures = (found.preventable, "preventable failure") if judged else (found.failures, "failure")
+    said = f"{many(found.tests, 'test')}, {many(*failures)}"
+    return f"{said}, {many(found.errors, 'error')}" if found.errors else said
 
 
 def _duration(seconds: float) -> str:

@@ -1,7 +1,9 @@
 """Rules that stop a batch before its last episode.
 
-All rules but the budget use only the rows in the order of their numbers, so that they stop at the
-same row for any number of processes.
+Where a reference driver judges, the first failure that ends a batch is the first preventable one.
+
+All rules but the budget look at the rows in the order of their numbers only, so that they stop at
+the same row however many processes play.
 """
 
 from __future__ import annotations
@@ -11,6 +13,7 @@ from collections.abc import Callable, Sequence
 
 from cavsumo.batch.tally import RATES, Found, Tally
 from cavsumo.model.scenario import BatchPlan, half_width
+from cavsumo.results.failures import NOT_JUDGED, PREVENTABLE
 
 Rule = Callable[[Tally], str | None]
 
@@ -22,7 +25,7 @@ def stopping_rule(plan: BatchPlan) -> Rule:
     """
     rules: list[Rule] = []
     if plan.first:
-        rules.append(_first_failure)
+        rules.append(_first_failure(plan.reference != "none"))
     if plan.until_tests is not None:
         rules.append(_enough_tests(plan.until_tests))
     if plan.until_half_width is not None:
@@ -38,9 +41,14 @@ def looks_at_rows(plan: BatchPlan) -> bool:
     return plan.first or any(value is not None for value in given)
 
 
-def _first_failure(tally: Tally) -> str | None:
-    row = tally.first.get("failure")
-    return None if row is None else f"first failure: run {row['run']}"
+def _first_failure(judged: bool) -> Rule:
+    kind, name = (PREVENTABLE, "preventable failure") if judged else (NOT_JUDGED, "failure")
+
+    def rule(tally: Tally) -> str | None:
+        row = tally.first.get(kind)
+        return None if row is None else f"first {name}: run {row['run']}"
+
+    return rule
 
 
 def _enough_tests(wanted: int) -> Rule:

@@ -3,46 +3,25 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
-from pathlib import Path
+from collections.abc import Sequence
 
 from rich.console import Console
 from rich.measure import Measurement
 from rich.table import Table
+from rich.text import Text
 
 from cavsumo.agents.base import VERDICTS
 from cavsumo.assertions.base import HELD, INVALID, UNFAIR, VIOLATED
-from cavsumo.batch.tally import Found, Row, Tally, found_by
-from cavsumo.egos.reference import REFERENCES
-from cavsumo.results.rows import cell, is_failure
+from cavsumo.batch import sentences
+from cavsumo.batch.ended import Ended
+from cavsumo.batch.tally import Found, Row, found_by
+from cavsumo.results.failures import NOT_JUDGED, ORDER, PREVENTABLE, UNPREVENTABLE
+from cavsumo.results.kaplan_meier import median_in_words
+from cavsumo.results.rows import cell
 from cavsumo.results.statistics import Rate
 
+WORD = 28  # letters of a name that are not broken
 WIDTH, WIDEST = 120, 1000  # a table cut off at the edge of a narrow terminal would hide figures
-
-
-@dataclass(frozen=True)
-class Ended:
-    """Result of a finished batch.
-
-    Attributes:
-        name: its name in a study; empty for none.
-        csv_file, tally, traces: its results file, its counts, the number of traces.
-        sequential: the number of episodes may depend on their results, so the intervals must be
-            valid at any stopping time.
-        shared: episodes shared simulations, and those played in a fresh one are found tests.
-        cut_short: the user stopped it.
-        promises: by agent, the class of egos for which its forecasts hold.
-    """
-
-    name: str
-    csv_file: Path
-    tally: Tally
-    traces: int = 0
-    sequential: bool = False
-    shared: bool = False
-    cut_short: bool = False
-    promises: Mapping[str, str] = field(default_factory=dict)
 
 
 def summarise(ended: Sequence[Ended]) -> None:
@@ -59,42 +38,55 @@ def summarise(ended: Sequence[Ended]) -> None:
     together = found_by(found for one in ended for found in one.tally.agents.values())
     _say_shared(ended, console)
     rows = sum(one.tally.rows for one in ended)
-    _say(
-        console,
-        f"\n{together.tests} tests in {rows} episodes, {together.failures} of them failed "
-        f"by the ego.  {_files(ended)}",
-    )
+    tests, episodes = sentences.many(together.tests, "test"), sentences.many(rows, "episode")
+    failed = sentences.failures(together, _judged(ended))
+    _say(console, f"\n{failed}, {tests} in {episodes}.  {_files(ended)}")
     _say_invalid(ended, console)
     for one in ended:
         _say_forecasts(one, console)
-        _say_preventable(one, console)
+        _say_failures(one, console)
+        _say_drive(one, console)
     _say_errors(ended, console)
-    if not together.failures and together.tests:
-        sequential = any(one.sequential for one in ended)
-        bound = together.rate("failures", sequential=sequential).high
-        _say(
-            console,
-            f"no failure in {together.tests} tests: at most {100 * (bound or 0):.1f} % (95 %)",
-        )
+    _say_bound(ended, console)
     _say_first(ended, console)
 
 
 def _table(ended: Sequence[Ended]) -> Table:
     """One line per agent of each batch."""
     several = any(one.name for one in ended)
+    failures = PREVENTABLE if any(one.judged for one in ended) else "failures"
+    others = _others(ended)
+    words = ["batch", "agent"] if several else ["agent"]
+    numbers = ["runs", failures, "of tests [95 %]", "tests", "rate [95 %]", *others, "errors"]
+    numbers.append("median to test")
+    rows = [
+        [one.name if i == 0 else "", agent][-len(words) :]
+        + _cells(found, one.sequential, failures, others)
+        for one in ended
+        for i, (agent, found) in enumerate(one.tally.agents.items())
+    ]
     table = Table(box=None, pad_edge=False, padding=(0, 2, 0, 0))
-    for title in ("batch", "agent") if several else ("agent",):
-        table.add_column(title, overflow="fold")  # a path may be long
-    for title in ("runs", "tests", "rate", "95 % interval", "failures", "of tests"):
-        table.add_column(title, justify="right", no_wrap=True)
-    invalid = any(one.tally.all.invalid for one in ended)
-    for title in ("unfair", *(["invalid"] if invalid else []), "errors", "median time"):
-        table.add_column(title, justify="right", no_wrap=True)
-    for one in ended:
-        for i, (agent, found) in enumerate(one.tally.agents.items()):
-            head = [one.name if i == 0 else "", agent] if several else [agent]
-            table.add_row(*head, *_cells(found, one.sequential, invalid))
+    for i, title in enumerate((*words, *numbers)):
+        longest = max(len(cell) for cell in (title, *(row[i] for row in rows)))
+        if i < len(words):  # a path may be long
+            table.add_column(Text(title), overflow="fold", min_width=min(WORD, longest))
+        else:
+            table.add_column(Text(title), justify="right", no_wrap=True, min_width=longest)
+    for row in rows:
+        table.add_row(*map(Text, row))
     return table
+
+
+def _others(ended: Sequence[Ended]) -> list[str]:
+    """The columns that are counted apart: other failures, and episodes that are no tests."""
+    everything = found_by(one.tally.all for one in ended)
+    judged = any(one.judged for one in ended)
+    return [
+        *([UNPREVENTABLE] if judged else []),
+        *([NOT_JUDGED] if judged and everything.not_judged else []),
+        "unfair",
+        *(["invalid"] if everything.invalid else []),
+    ]
 
 
 def _verdicts(ended: Sequence[Ended]) -> Table:
@@ -121,7 +113,8 @@ def _files(ended: Sequence[Ended]) -> str:
         return f"{first.csv_file} to {last.csv_file.name} ({len(ended)} batches)"
     files = f"{first.csv_file}, {first.csv_file.with_suffix('.json')}"
     if first.traces:
-        files += f", {first.csv_file.with_suffix('')}/ ({first.traces} traces)"
+        traces = sentences.many(first.traces, "trace")
+        files += f", {first.csv_file.with_suffix('')}/ ({traces})"
     return files
 
 
@@ -167,21 +160,19 @@ def _first(ended: Sequence[Ended], what: str) -> tuple[Row | None, str]:
     return None, ""
 
 
-def _cells(found: Found, sequential: bool, invalid: bool) -> list[str]:
-    """The cells of one agent; ``invalid``: with the number of invalid episodes."""
-    tests, failures = (found.rate(r, sequential=sequential) for r in ("tests", "failures"))
-    median = found.median_time()
+def _cells(found: Found, sequential: bool, failures: str, others: Sequence[str]) -> list[str]:
+    """The cells of one agent: the failures that lead, tests, and the columns of ``others``."""
+    tests, failed = (found.rate(r, sequential=sequential) for r in ("tests", failures))
+    median = median_in_words(found.curve())
     return [
         str(found.episodes),
+        str(failed.count),
+        f"{percent(failed.value)} {interval(failed)}".strip(),
         str(found.tests),
-        percent(tests.value),
-        interval(tests),
-        str(found.failures),
-        f"{percent(failures.value)} {interval(failures)}".strip(),
-        str(found.unfair),
-        *([str(found.invalid)] if invalid else []),
+        f"{percent(tests.value)} {interval(tests)}".strip(),
+        *(str(getattr(found, name.replace(" ", "_"))) for name in others),
         str(found.errors),
-        "" if median is None else f"{median:.1f} s",
+        f"{median} s" if median else "",
     ]
 
 
@@ -194,54 +185,66 @@ def _say_forecasts(one: Ended, console: Console) -> None:
             total = sum(count.total() for count in said.values())
             _say(
                 console,
-                (f"{one.name}: " if one.name else "")
+                _of(one)
                 + f"{agent}: of {total} starts {sure.total()} are sure, {open_.total()} undecided, "
                 f"{lost.total()} not forceable against {one.promises.get(agent, 'its egos')}; "
                 f"tests in {sure[True]}, {open_[True]} and {lost[True]} of them",
             )
 
 
-def _say_preventable(one: Ended, console: Console) -> None:
-    """The number of failures that the reference driver would have avoided, if they were judged."""
-    row = one.tally.first.get("failure")
-    reference = str(row.get("reference") or "") if row else ""
-    if reference not in REFERENCES:
+def _say_failures(one: Ended, console: Console) -> None:
+    """Print the preventable failures of a batch, and apart from them the others."""
+    said = sentences.judgement(one.tally.all, one.reference) if one.judged else ""
+    if said:
+        _say(console, _of(one) + said)
+
+
+def _say_drive(one: Ended, console: Console) -> None:
+    """How the ego of a batch came along; an ego that stood still or crawled is named."""
+    found, row = one.tally.all, one.tally.first.get("frozen")
+    for said in filter(None, (sentences.drive(found), sentences.frozen(found))):
+        _say(console, _of(one) + said)
+    if row is not None:
+        _say(console, f"       first: {_replay(one, row)}")
+
+
+def _say_bound(ended: Sequence[Ended], console: Console) -> None:
+    """Print the bound where no failure was found; unpreventable ones apart."""
+    together, judged = found_by(one.tally.all for one in ended), _judged(ended)
+    if not together.tests or together.preventable or together.not_judged:
         return
-    together = one.tally.all
-    left = together.failures - together.preventable.total()
-    words = REFERENCES.make(reference, {}).words
-    _say(
-        console,
-        (f"{one.name}: " if one.name else "")
-        + f"{together.failures} failure{'s' * (together.failures > 1)}, "
-        f"{together.preventable[True]} of them preventable by {words}"
-        + (f", {left} not judged" if left else ""),
-    )
+    name = "preventable" if judged else "failures"
+    bound = together.rate(name, sequential=any(one.sequential for one in ended)).high
+    what = "preventable failure" if judged else "failure"
+    tests = sentences.many(together.tests, "test")
+    _say(console, f"no {what} in {tests}: at most {100 * (bound or 0):.1f} % (95 %)")
 
 
 def _say_first(ended: Sequence[Ended], console: Console) -> None:
-    """Print the first failure, else the first test, with its replay command."""
-    for what in ("failure", "test"):
+    """Point to the first failure, a preventable one if there is any, else to the first test."""
+    for kind in (*ORDER, "test"):
         for one in ended:
-            row = one.tally.first.get(what)
+            row = one.tally.first.get(kind)
             if row is not None:
-                _say(
-                    console,
-                    f"first {what}: run {row['run']} ({row['agent']}): {event(row)}"
-                    f"\n       cavsumo replay {one.csv_file} {row['run']} --html "
-                    f"run{row['run']}.html",
-                )
+                what = kind if kind == "test" else f"{kind} failure" if one.judged else "failure"
+                told = f"first {what}: run {row['run']} ({row['agent']}): {sentences.event(row)}"
+                _say(console, f"{told}\n       {_replay(one, row)}")
                 return
 
 
-def event(row: Row) -> str:
-    """The event of a test, with its time and body."""
-    violated = is_failure(row)
-    when = float(row["violation_time_s"] if violated else row["trigger_time_s"])
-    hit = violated and cell(row["impact_speed_mps"])
-    what = "collision" if hit else f"{row['assertion']} {'violated' if violated else 'triggered'}"
-    tester = f" with {row['tester']}" if row["tester"] else ""
-    return f"{what} at {when:.1f} s{tester}"
+def _replay(one: Ended, row: Row) -> str:
+    """The command that shows an episode."""
+    return f"cavsumo replay {one.csv_file} {row['run']} --html run{row['run']}.html"
+
+
+def _of(one: Ended) -> str:
+    """The beginning of a sentence about one of several batches."""
+    return f"{one.name}: " if one.name else ""
+
+
+def _judged(ended: Sequence[Ended]) -> bool:
+    """Whether the failures of all batches were judged."""
+    return all(one.judged for one in ended)
 
 
 def _say(console: Console, text: str) -> None:

@@ -6,8 +6,9 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from cavsumo.report.compare import PairedComparison, comparisons
+from cavsumo.report.compare import PairedComparison, comparisons, events
 from cavsumo.report.distinct import Distinct, FailureCell, distinct, failure_cells
+from cavsumo.report.driving import EgoDriving, driving
 from cavsumo.report.effort import Effort, effort
 from cavsumo.report.events import Described, described
 from cavsumo.report.grouping import Group, grouped
@@ -22,18 +23,21 @@ class Report:
 
     Attributes:
         by: the column that rows are grouped by besides their agents; "agent" for none.
-        evidence: the rows and their sources.
-        groups: the groups of rows.
-        rates, times, efforts, distinct: one entry a group, in the same order.
+        evidence: the rows and where they come from.
+        groups: the rows told together.
+        events: the failures that lead, preventable ones where all were judged, and tests.
+        rates, driving, times, efforts, distinct: one entry a group, in the same order.
         comparisons: groups in pairs, on the same seeds.
-        tests: the data of each test from its trace, by the index of its row.
-        failures: classes of similar failures, the most frequent first.
+        tests: what the traces tell of each test, by the index of its row.
+        failures: failures that are alike, those that were preventable most often first.
     """
 
     by: str
     evidence: Evidence
     groups: Sequence[Group]
+    events: tuple[str, str]
     rates: Sequence[Rates]
+    driving: Sequence[EgoDriving]
     comparisons: Sequence[PairedComparison]
     times: Sequence[TimeToTest]
     efforts: Sequence[Effort]
@@ -51,7 +55,9 @@ def analyse(files: Sequence[Path], by: str = "agent") -> Report:
         by,
         evidence,
         groups,
+        events(groups),
         [rates(group) for group in groups],
+        [driving(group) for group in groups],
         comparisons(groups, by),
         times_to_test(groups),
         [effort(group) for group in groups],

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 from cavsumo.report.analysis import Report
 from cavsumo.report.grouping import Told
-from cavsumo.report.pairs import Interval
+from cavsumo.results.statistics import Interval
 
 TOPICS = ("results", "shares", "pairs", "times", "effort", "distinct")
 

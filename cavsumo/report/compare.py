@@ -10,7 +10,6 @@ import pandas
 
 from cavsumo.report.grouping import Group
 from cavsumo.report.pairs import (
-    Interval,
     Pairs,
     holm,
     mcnemar,
@@ -19,12 +18,22 @@ from cavsumo.report.pairs import (
     sequential_mcnemar,
     sequential_ratio_interval,
 )
+from cavsumo.results.statistics import Interval
 
-# The compared events of a valid episode: it was a test, and the ego failed it.
+# What is compared: of a valid episode, whether the ego failed preventably, failed at all, and
+# whether it was a test.
 EVENTS: dict[str, Callable[[pandas.DataFrame], pandas.Series]] = {
-    "tests": lambda rows: rows["outcome"].isin(("held", "violated")),
+    "preventable": lambda rows: (rows["outcome"] == "violated") & (rows["avoidable"] == 1),
     "failures": lambda rows: rows["outcome"] == "violated",
+    "tests": lambda rows: rows["outcome"].isin(("held", "violated")),
 }
+WORDS = {"preventable": "preventable failures"}  # for events, where the name alone is too short
+
+
+def events(groups: Sequence[Group]) -> tuple[str, str]:
+    """The events that a report leads with: failures, preventable ones if all were judged, tests."""
+    judged = all(group.reference for group in groups)
+    return ("preventable" if judged else "failures"), "tests"
 
 
 @dataclass(frozen=True)
@@ -32,11 +41,11 @@ class PairedComparison:
     """Two groups on the same seeds.
 
     Attributes:
-        setting: the setting, if there are several.
-        first, second: the compared agents, or values of the column for one agent.
-        agent: the agent of both; empty when agents are compared.
-        event: the counted event, tests or failures.
-        pairs: the pairs of valid episodes by their events.
+        setting: which setting, if there are several.
+        first, second: who is compared: agents, or values of the column for one agent.
+        agent: the agent that both are of; empty when agents are compared.
+        event: what is counted, one of ``EVENTS``.
+        pairs: the pairs of valid episodes by what happened in them.
         ratio: the first's rate over the second's; infinite over none, None when neither has any.
         interval: its 95 % interval.
         p, p_holm: McNemar's p-value; the same adjusted for all comparisons of the report.
@@ -63,7 +72,7 @@ def comparisons(groups: Sequence[Group], by: str = "agent") -> list[PairedCompar
     """
     found = [
         _compared(later, earlier, event, by)
-        for event in EVENTS
+        for event in events(groups)
         for earlier, later in _comparable(groups, by)
     ]
     found = [comparison for comparison in found if comparison.pairs.total]

@@ -16,7 +16,9 @@ from typing import NamedTuple
 from cavsumo.report.events import Described, Event
 from cavsumo.report.grouping import Group, Told
 from cavsumo.report.load import Batch
+from cavsumo.results.failures import ORDER, failure_kind
 
+JUDGED = ("outcome", "avoidable")  # columns that say whether a failure was preventable
 SPEED_BIN, PLACE_BIN = 2.0, 10.0  # m/s, m
 
 
@@ -62,10 +64,11 @@ class Distinct(Told):
     """The diversity of the tests and of the failures of a group.
 
     Attributes:
+        preventable, failures: at their impacts.
         tests: at their triggers.
-        failures: at their impacts.
     """
 
+    preventable: Diversity
     tests: Diversity
     failures: Diversity
 
@@ -75,14 +78,15 @@ class FailureCell:
     """Similar failures of all agents together.
 
     Attributes:
-        cell: their cell.
-        count: their number.
-        file, run: the first of them.
-        agents: the agents that found them.
+        cell: what they have in common.
+        count, preventable: how many there are, how many of them were preventable.
+        file, run: the first of them, a preventable one if there is any.
+        agents: who found them.
     """
 
     cell: Cell
     count: int
+    preventable: int
     file: str
     run: int
     agents: tuple[str, ...]
@@ -102,15 +106,18 @@ def _floor(value: float, width: float) -> float:
 
 
 def distinct(group: Group, tests: Mapping[int, Described], batches: tuple[Batch, ...]) -> Distinct:
-    """The diversity of the tests and failures of a group."""
-    found = [
-        (tests[int(index)], batches[batch].plan.scenario.kind)
-        for index, batch in group.rows["batch"].items()
-        if int(index) in tests
-    ]
-    triggers = [cell_of(test.trigger, kind, "") for test, kind in found]
-    impacts = [cell_of(test.impact, kind, "") for test, kind in found if test.impact is not None]
-    return Distinct(*group.whose, tests=diversity(triggers), failures=diversity(impacts))
+    """How different the tests and failures of a group are."""
+    triggers, impacts, preventable = [], [], []
+    for row in group.rows[["batch", "avoidable"]].itertuples():
+        test = tests.get(int(row.Index))
+        if test is None:
+            continue
+        kind = batches[row.batch].plan.scenario.kind
+        triggers.append(cell_of(test.trigger, kind, ""))
+        if test.impact is not None:
+            impacts.append(cell_of(test.impact, kind, ""))
+            preventable += impacts[-1:] if row.avoidable == 1 else []
+    return Distinct(*group.whose, *map(diversity, (preventable, triggers, impacts)))
 
 
 def diversity(cells: Iterable[Cell | None]) -> Diversity:
@@ -131,20 +138,25 @@ def diversity(cells: Iterable[Cell | None]) -> Diversity:
 def failure_cells(
     groups: Iterable[Group], tests: Mapping[int, Described], batches: tuple[Batch, ...]
 ) -> list[FailureCell]:
-    """The cells of all failures, the most frequent first."""
-    members: dict[Cell, list[tuple[str, int, str]]] = {}
+    """The cells of all failures, those that were preventable most often first."""
+    members: dict[Cell, list[tuple[int, str, int, str]]] = {}
     for group in groups:
         rows = group.rows[group.rows["outcome"] == "violated"]
-        for row in rows[["batch", "file", "run", "agent"]].itertuples():
+        for row in rows[["batch", "file", "run", "agent", *JUDGED]].itertuples():
             impact = tests[int(row.Index)].impact
             kind = batches[row.batch].plan.scenario.kind
             cell = cell_of(impact, kind, group.setting) if impact is not None else None
             if cell is not None:
-                members.setdefault(cell, []).append((row.file, int(row.run), row.agent))
+                order = ORDER.index(failure_kind(row._asdict()))
+                members.setdefault(cell, []).append((order, row.file, int(row.run), row.agent))
     found = [
         FailureCell(
-            cell, len(rows), *min(rows)[:2], agents=tuple(dict.fromkeys(a for *_, a in rows))
+            cell,
+            len(rows),
+            sum(order == 0 for order, *_ in rows),
+            *min(rows)[1:3],
+            agents=tuple(dict.fromkeys(a for *_, a in rows)),
         )
         for cell, rows in members.items()
     ]
-    return sorted(found, key=lambda f: (-f.count, f.file, f.run))
+    return sorted(found, key=lambda f: (-f.preventable, -f.count, f.file, f.run))

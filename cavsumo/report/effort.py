@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from cavsumo.report.compare import EVENTS
 from cavsumo.report.grouping import Group, Told
-from cavsumo.report.pairs import Interval
+from cavsumo.results.statistics import Interval
 
 
 @dataclass(frozen=True)
@@ -34,14 +34,18 @@ class Effort(Told):
         simulated_s: simulated time of its valid episodes [s].
         real_s: real time of the processes that played all its episodes, errors included [s]; that
             is CPU time as long as there are no more processes than processors.
-        tests_simulated, failures_simulated: per simulated second.
-        tests_real, failures_real: per second of real time of a process.
+        preventable_simulated, tests_simulated, failures_simulated: per simulated second.
+        preventable_real, tests_real, failures_real: per second of real time of a process.
+
+    Preventable failures have no figures where not all were judged.
     """
 
     simulated_s: float
     real_s: float
+    preventable_simulated: PerSecond
     tests_simulated: PerSecond
     failures_simulated: PerSecond
+    preventable_real: PerSecond
     tests_real: PerSecond
     failures_real: PerSecond
 
@@ -55,12 +59,16 @@ def effort(group: Group) -> Effort:
         {name: per_second(happened(rows).to_numpy(float), seconds) for name, happened in events}
         for rows, seconds in ((valid, simulated), (group.rows, real))
     )
+    if not group.reference:
+        per_simulated["preventable"] = per_real["preventable"] = PerSecond(None, None)
     return Effort(
         *group.whose,
         simulated_s=float(simulated.sum()),
         real_s=float(real.sum()),
+        preventable_simulated=per_simulated["preventable"],
         tests_simulated=per_simulated["tests"],
         failures_simulated=per_simulated["failures"],
+        preventable_real=per_real["preventable"],
         tests_real=per_real["tests"],
         failures_real=per_real["failures"],
     )

@@ -12,6 +12,7 @@ from cavsumo.report.compare import PairedComparison
 from cavsumo.report.effort import PerSecond
 from cavsumo.report.load import Batch
 from cavsumo.report.rates import Share
+from cavsumo.report.survival import RunOf
 from cavsumo.results.statistics import Rate
 
 FORMAT = "cavsumo-report-1"
@@ -30,6 +31,7 @@ def as_json(report: Report) -> dict[str, Any]:
             _batch(b, int(counts.get(i, 0))) for i, b in enumerate(report.evidence.batches)
         ],
         "rates": [_plain(one) for one in report.rates],
+        "driving": [_plain(one) for one in report.driving],
         "comparisons": [_plain(one) for one in report.comparisons],
         "time_to_test": [
             _plain(dataclasses.replace(one, curve=None), leave_out=("curve",))
@@ -83,6 +85,7 @@ def lines(report: Report) -> Iterator[Line]:
     """One figure a line, in the order of ``COLUMNS``; empty cells are None."""
     sections: Mapping[str, Sequence[Any]] = {
         "rates": report.rates,
+        "driving": report.driving,
         "time_to_test": report.times,
         "effort": report.efforts,
         "distinct": report.distinct,
@@ -106,6 +109,9 @@ def _figures(record: Any, name: str) -> Iterator[Line]:
     elif isinstance(value, Mapping):
         for key, share in value.items():
             yield from _share_figures(f"{name} {key}", share)
+    elif isinstance(value, RunOf):
+        yield f"{name}: run", value.run, None, None, None
+        yield f"{name}: file", value.file, None, None, None
     elif isinstance(value, PerSecond):
         yield name, value.value, *(value.interval or (None, None)), None
     elif dataclasses.is_dataclass(value):

@@ -55,11 +55,13 @@ class Group(Told):
 
     Attributes:
         rows: its rows (``Evidence.rows``), by file and run.
-        sequential: the number of rows may depend on their results.
+        sequential: how many rows there are may depend on what they found.
+        reference: the driver that judged its failures; empty if not all of them were judged.
     """
 
     rows: pandas.DataFrame
     sequential: bool
+    reference: str = ""
 
     @property
     def valid(self) -> pandas.DataFrame:
@@ -90,10 +92,18 @@ def grouped(evidence: Evidence, by: str = "agent") -> list[Group]:
             str(key[1]),
             "".join(map(str, key[2:])),
             rows,
-            any(evidence.batches[i].sequential for i in rows["batch"].unique()),
+            any(batch.sequential for batch in batches),
+            reference_of(batches),
         )
         for key, rows in found
+        for batches in ([evidence.batches[i] for i in rows["batch"].unique()],)
     ]
+
+
+def reference_of(batches: Sequence[Batch]) -> str:
+    """The driver that judged the failures of some batches; empty if not all of them were judged."""
+    names = dict.fromkeys(batch.plan.reference for batch in batches)
+    return "" if "none" in names else ", ".join(names)
 
 
 def settings_of(batches: Sequence[Batch], by: str) -> list[int]:

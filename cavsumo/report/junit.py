@@ -5,15 +5,21 @@ from __future__ import annotations
 import re
 import shlex
 import xml.etree.ElementTree as ET
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from typing import Any
 
 import pandas
 
-from cavsumo.batch.summary import event, interval, percent
-from cavsumo.report.grouping import Group
+from cavsumo.assertions.base import VIOLATED
+from cavsumo.batch import sentences
+from cavsumo.batch.sentences import event
+from cavsumo.batch.summary import interval, percent
+from cavsumo.report.driving import EgoDriving, driving
+from cavsumo.report.grouping import Group, reference_of
 from cavsumo.report.load import Batch, Evidence
 from cavsumo.report.rates import Rates, rates
+from cavsumo.results.failures import ORDER, PREVENTABLE, failure_kind, preventable_first
 from cavsumo.results.rows import verdicts_of
 
 SHOWN = 20  # failures or errors told of in one case
@@ -39,8 +45,10 @@ def _suite(batch: Batch, rows: pandas.DataFrame) -> ET.Element:
     cases = []
     for agent in batch.plan.cast:
         own = rows[rows["agent"] == agent]
-        _properties(properties, agent, rates(Group("", agent, "", own, batch.sequential)))
+        group = Group("", agent, "", own, batch.sequential, reference_of([batch]))
+        _properties(properties, agent, rates(group))
         cases += [_case(batch, agent, name, own) for name in batch.plan.scenario.assertions]
+        cases += _standing(agent, driving(group))
         cases += _errors(agent, own)
     suite.extend(cases)
     _count(suite, cases)
@@ -48,12 +56,13 @@ def _suite(batch: Batch, rows: pandas.DataFrame) -> ET.Element:
 
 
 def _properties(parent: ET.Element, agent: str, found: Rates) -> None:
-    """The shares of an agent with their intervals."""
+    """The shares of an agent with their intervals, preventable failures first."""
+    judged = bool(found.reference)
     for what, share in (
+        ("preventable", found.preventable) if judged else ("failures", found.failures),
         ("tests", found.tests),
-        ("failures", found.failures),
+        *([("unpreventable", found.unpreventable)] if judged else []),
         ("unfair", found.unfair),
-        *([("preventable", found.preventable)] if found.preventable.total else []),
     ):
         spans = "; ".join(f"{m} {interval(r)}" for m, r in share.intervals.items() if share.total)
         text = f"{share.count} of {share.total} {share.of}"
@@ -72,15 +81,33 @@ def _case(batch: Batch, agent: str, assertion: str, rows: pandas.DataFrame) -> E
     case = ET.Element("testcase", classname=_legal(agent), name=assertion)
     case.set("time", f"{rows['wall_s'].sum():.3f}")
     if len(failures):
-        shown = failures.head(SHOWN).to_dict("records")
-        told = [_replay(batch, row, assertion) for row in shown]
-        message = f"{len(failures)} of {len(tests)} tests failed; first: {told[0]}"
+        ordered = preventable_first(_own(row, assertion) for row in failures.to_dict("records"))
+        told = [_replay(batch, row, assertion) for row in ordered[:SHOWN]]
+        message = f"{_failed(batch, ordered, len(tests))}; first: {told[0]}"
         _add(case, "failure", message, _with_rest(told, len(failures)), assertion)
     elif not len(tests):
         valid = int((~rows["outcome"].isin(("error", "invalid"))).sum())
         message = f"no test of it in {valid} valid episodes: nothing is known"
         ET.SubElement(case, "skipped", message=message)
     return case
+
+
+def _own(row: Mapping[Any, Any], assertion: str) -> dict[Any, Any]:
+    """A failure of an assertion; what was judged is that of the assertion of the row."""
+    judged = row["avoidable"] if row["assertion"] == assertion else None
+    return {**row, "outcome": VIOLATED, "avoidable": judged}
+
+
+def _failed(batch: Batch, failures: Sequence[Mapping[Any, Any]], tests: int) -> str:
+    """How many tests failed, the preventable failures first."""
+    if batch.plan.reference == "none":
+        return f"{len(failures)} of {tests} tests failed"
+    kinds = Counter(failure_kind(row) for row in failures)
+    preventable = sentences.many(kinds[PREVENTABLE], "failure")
+    by = sentences.driver(batch.plan.reference)
+    said = f"{preventable} of {tests} tests preventable by {by}"
+    rest = ", ".join(f"{kinds[kind]} {kind}" for kind in ORDER[1:] if kinds[kind])
+    return f"{said}; apart from that {rest}" if rest else said
 
 
 def _verdict(row: Mapping[Any, Any], assertion: str) -> str:
@@ -93,7 +120,17 @@ def _replay(batch: Batch, row: Mapping[Any, Any], assertion: str) -> str:
     """The failure, and the command that replays it."""
     command = shlex.join(["cavsumo", "replay", str(batch.csv_file), str(row["run"])])
     told = event(row) if row["assertion"] == assertion else f"{assertion} violated"
-    return f"run {row['run']} (seed {row['seed']}): {told}: {command}"
+    judged = "" if batch.plan.reference == "none" else f", {failure_kind(row)}"
+    return f"run {row['run']} (seed {row['seed']}){judged}: {told}: {command}"
+
+
+def _standing(agent: str, found: EgoDriving) -> list[ET.Element]:
+    """A case of its own for an ego that stood still or crawled, which no failure shows."""
+    if not found.warning:
+        return []
+    case = ET.Element("testcase", classname=_legal(agent), name="the ego drives")
+    ET.SubElement(case, "skipped", message=_legal(found.warning))
+    return [case]
 
 
 def _errors(agent: str, rows: pandas.DataFrame) -> list[ET.Element]:

@@ -27,6 +27,9 @@ NUMBERS = (
     "impact_speed_mps",
     "wall_s",
     "avoidable",
+    "arrived",
+    "lost_s",
+    "stood_s",
 )
 WORDS = (
     "agent",
@@ -37,6 +40,7 @@ WORDS = (
     "verdicts",
     "tester",
     "reference",
+    "frozen",
     "trace",
     "error",
 )

@@ -6,9 +6,8 @@ import math
 from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
-from cavsumo.results.statistics import sequential_p, sequential_rate
+from cavsumo.results.statistics import Interval, sequential_p, sequential_rate
 
-Interval = tuple[float, float]
 Z2 = 1.959963984540054**2  # squared, of a 95 % interval
 
 

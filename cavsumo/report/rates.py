@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Mapping
 from dataclasses import dataclass
 
 from cavsumo.assertions.base import VIOLATED
-from cavsumo.batch.tally import Found
+from cavsumo.batch.tally import tallied
 from cavsumo.report.grouping import Group, Told
 from cavsumo.results.statistics import Rate, rate, sequential_rate
 
@@ -42,48 +41,52 @@ class Rates(Told):
     """The shares of one group.
 
     Attributes:
-        episodes, invalid, errors: numbers of episodes, of those in which a tester broke the rules
-            of the world, of those that could not be played.
+        episodes, invalid, errors: how many there are, in how many a tester broke the rules of the
+            world, how many could not be played.
+        preventable: failures that the reference driver would have avoided, of tests.
         tests, failures, unfair: of valid episodes, of tests, of valid episodes.
-        preventable: failures that the reference driver would have avoided, of those judged.
-        reference: its name, empty if none was judged.
+        unpreventable: failures that it would not have avoided, of tests.
+        not_judged: how many failures nobody judged.
+        reference: who judged, empty if not all failures were judged.
         blame: by the rule broken first, as ``party:rule``, the most frequent first: of failures.
     """
 
     episodes: int
     invalid: int
     errors: int
+    preventable: Share
     tests: Share
     failures: Share
     unfair: Share
-    preventable: Share
+    unpreventable: Share
+    not_judged: int
     reference: str
     blame: Mapping[str, Share]
 
 
 def rates(group: Group) -> Rates:
     """The shares of one group."""
-    found = Found(Counter(group.rows["outcome"]))
-    sequential = group.sequential
-    judged = group.rows[group.rows["avoidable"].notna()]
+    found = tallied(group.rows.to_dict("records"))
     failed = group.rows[group.rows["outcome"] == VIOLATED]
+
+    def of(name: str, total: str, words: str) -> Share:
+        whole = getattr(found, total)
+        return share(getattr(found, name), whole, words, sequential=group.sequential)
+
     return Rates(
         *group.whose,
         episodes=found.episodes,
         invalid=found.invalid,
         errors=found.errors,
-        tests=share(found.tests, found.valid, "valid episodes", sequential=sequential),
-        failures=share(found.failures, found.tests, "tests", sequential=sequential),
-        unfair=share(found.unfair, found.valid, "valid episodes", sequential=sequential),
-        preventable=share(
-            int((judged["avoidable"] == 1).sum()),
-            len(judged),
-            "judged failures",
-            sequential=sequential,
-        ),
-        reference=", ".join(judged["reference"].unique()),
+        preventable=of("preventable", "tests", "tests"),
+        tests=of("tests", "valid", "valid episodes"),
+        failures=of("failures", "tests", "tests"),
+        unfair=of("unfair", "valid", "valid episodes"),
+        unpreventable=of("unpreventable", "tests", "tests"),
+        not_judged=found.not_judged,
+        reference=group.reference,
         blame={
-            rule or NO_RULE: share(count, found.failures, "failures", sequential=sequential)
+            rule or NO_RULE: share(count, found.failures, "failures", sequential=group.sequential)
             for rule, count in failed["blame"].value_counts().items()
         },
     )

@@ -4,17 +4,18 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 
+from cavsumo.batch.sentences import many
 from cavsumo.batch.summary import interval, percent
 from cavsumo.report.analysis import Report
 from cavsumo.report.cells import Labels, Table, number, p_value, span
-from cavsumo.report.compare import EVENTS, PairedComparison
-from cavsumo.report.distinct import PLACE_BIN, SPEED_BIN, Distinct, Diversity, FailureCell
+from cavsumo.report.compare import WORDS, PairedComparison
+from cavsumo.report.driving import EgoDriving
 from cavsumo.report.effort import Effort, PerSecond
 from cavsumo.report.load import Batch
 from cavsumo.report.rates import EXACT, SEQUENTIAL, WILSON, Rates, Share
-from cavsumo.report.survival import TimeToTest
-
-SHOWN = 10  # cells of failures
+from cavsumo.report.survival import RunOf
+from cavsumo.report.tables_of_cells import distinct_table, failures_table
+from cavsumo.results.kaplan_meier import median_in_words
 
 
 def tables(report: Report) -> Iterator[Table]:
@@ -24,14 +25,15 @@ def tables(report: Report) -> Iterator[Table]:
     if not report.groups:
         return
     yield _rates(report.rates, labels)
+    yield _driving(report.driving, labels)
     if any(one.blame for one in report.rates):
         yield _blame(report.rates, labels)
     yield from _comparisons(report, labels)
-    yield _times(report.times, labels)
+    yield _times(report, labels)
     yield _effort(report, labels)
-    yield _distinct(report.distinct, labels)
+    yield distinct_table(report, labels)
     if report.failures:
-        yield _failures(report.failures, len(report.evidence.batches) > 1)
+        yield failures_table(report)
 
 
 def _batches(batches: Sequence[Batch], report: Report) -> Table:
@@ -70,26 +72,52 @@ def _batch_notes(batches: Sequence[Batch]) -> Iterator[str]:
 
 def _rates(found: Sequence[Rates], labels: Labels) -> Table:
     """Shares with intervals."""
-    kinds = ("tests", "failures", "unfair", "preventable")
     methods = _methods(found)
     rows = []
     for one in found:
-        for what in kinds:
-            share: Share = getattr(one, what)
-            if what == "preventable" and not share.total:
-                continue
-            name = f"{what} ({one.reference})" if what == "preventable" else what
-            rows.append([*labels.cells(one), name, *_share(share, methods)])
-        for what, count in (("invalid", one.invalid), ("errors", one.errors)):
-            if not count:
-                continue
-            cells = [what, str(count), f"of {one.episodes} episodes", ""]
-            rows.append([*labels.cells(one), *cells, *("" for _ in methods)])
+        judged = f"preventable ({one.reference})"
+        shares = {judged: one.preventable} if one.reference else {"failures": one.failures}
+        shares |= {"tests": one.tests}
+        shares |= {"unpreventable": one.unpreventable} if one.reference else {}
+        for what, share in (shares | {"unfair": one.unfair}).items():
+            rows.append([*labels.cells(one), what, *_share(share, methods)])
+        not_judged = one.not_judged if one.reference else 0
+        for what, count, of in (
+            ("not judged", not_judged, many(one.failures.count, "failure")),
+            ("invalid", one.invalid, many(one.episodes, "episode")),
+            ("errors", one.errors, many(one.episodes, "episode")),
+        ):
+            if count:
+                cells = [what, str(count), f"of {of}", "", *("" for _ in methods)]
+                rows.append([*labels.cells(one), *cells])
     titles = ("count", "", "share", *methods)
     words = (*labels.titles, "of what")
     return Table(
         "shares", "Shares, with 95 % intervals in %", words, titles, rows, heads=len(words) - 1
     )
+
+
+def _driving(found: Sequence[EgoDriving], labels: Labels) -> Table:
+    """How the ego came along."""
+    rows = [
+        [
+            *labels.cells(one),
+            f"{one.arrived} of {one.could_arrive}",
+            "" if one.lost_s is None else f"{one.lost_s:.1f}",
+            "" if one.stood_s is None else f"{one.stood_s:.1f}",
+            str(one.stood_still),
+            str(one.crawled),
+        ]
+        for one in found
+    ]
+    numbers = ("arrived", "lost [s]", "stood [s]", "stood still", "crawled")
+    notes = [
+        "Arrived: of the episodes that no verdict ended. Lost: mean time against a free drive on "
+        "an empty road. Stood still: 10 s or longer when the episode ended; crawled: more than "
+        "four times as long as the free drive while it moved.",
+        *dict.fromkeys(one.warning for one in found if one.warning),
+    ]
+    return Table("shares", "How the ego came along", labels.titles, numbers, rows, notes)
 
 
 def _blame(found: Sequence[Rates], labels: Labels) -> Table:
@@ -123,12 +151,12 @@ def _comparisons(report: Report, labels: Labels) -> Iterator[Table]:
     words = [title for title in labels.titles if title == "setting"]
     words += ["agent"] if report.by != "agent" else []
     numbers = ("pairs", "only first", "only second", "ratio", "95 % interval", "p", "p (Holm)")
-    for event in EVENTS:
+    for event in report.events:
         found = [c for c in report.comparisons if c.event == event]
         if found:
             rows = [_comparison(one, words) for one in found]
-            title = f"{event.capitalize()} on the same seeds"
-            notes = () if event == "tests" else _comparison_notes(report.comparisons)
+            title = f"{WORDS.get(event, event).capitalize()} on the same seeds"
+            notes = _comparison_notes(report) if event == "tests" else ()
             yield Table("pairs", title, (*words, "first : second"), numbers, rows, notes)
 
 
@@ -148,9 +176,10 @@ def _comparison(one: PairedComparison, words: Sequence[str]) -> list[str]:
     ]
 
 
-def _comparison_notes(found: Sequence[PairedComparison]) -> list[str]:
-    """The methods of the comparisons."""
-    methods = []
+def _comparison_notes(report: Report) -> list[str]:
+    """By which methods."""
+    methods, found = [], report.comparisons
+    what = WORDS.get(report.events[0], report.events[0])
     if any(not one.sequential for one in found):
         methods.append(
             "Ratio of the first's rate per valid episode to the second's with the score interval "
@@ -161,41 +190,50 @@ def _comparison_notes(found: Sequence[PairedComparison]) -> list[str]:
             "After stopping: ratio with the interval from both rates' confidence sequences, p of "
             "McNemar's hypothesis by the same martingale."
         )
-    return [*methods, f"Holm: adjusted for all {len(found)} comparisons, of tests and failures."]
+    return [*methods, f"Holm: adjusted for all {len(found)} comparisons, of {what} and tests."]
 
 
-def _times(found: Sequence[TimeToTest], labels: Labels) -> Table:
-    """The times of tests."""
+def _times(report: Report, labels: Labels) -> Table:
+    """When tests come."""
+    found, several = report.times, len(report.evidence.batches) > 1
+    failure = "preventable" if report.events[0] == "preventable" else "failure"
     limit = next((one.limit for one in found if one.limit is not None), None)
     mean = "mean" if limit is None else f"mean to {limit:.1f}"
     rows = [
         [
             *labels.cells(one),
             str(one.censored),
-            "" if one.median is None else f"{one.median:.1f}",
+            median_in_words(one.curve),
             span(one.median_interval, ".1f"),
             "" if one.mean is None else f"{one.mean:.1f}",
             span(one.mean_interval, ".1f"),
-            *("none" if n is None else str(n) for n in (one.first_test, one.first_failure)),
+            *(_run(first, several) for first in (getattr(one, f"first_{failure}"), one.first_test)),
         ]
         for one in found
     ]
-    numbers = ("censored", "median", "95 %", mean, "95 %", "1st test", "1st failure")
+    numbers = ("censored", "median", "95 %", mean, "95 %", f"1st {failure}", "1st test")
     notes = [
         "Seconds by Kaplan and Meier. Episodes without a test are censored at their end, unfair "
         "ones too: a tester that came too early shows only that there was no test so far.",
-        "1st test, 1st failure: in which valid episode.",
+        f"1st {failure}, 1st test: the run, as cavsumo replay takes it.",
     ]
     return Table(
         "times", "Time to the test, within an episode [s]", labels.titles, numbers, rows, notes
     )
 
 
+def _run(first: RunOf | None, several: bool) -> str:
+    """A run by its number, with its file where there are several."""
+    if first is None:
+        return "none"
+    return f"{first.file} {first.run}" if several else str(first.run)
+
+
 def _effort(report: Report, labels: Labels) -> Table:
     """The rates of tests and failures per second."""
     rows = []
     for rate, one in zip(report.rates, report.efforts, strict=True):
-        for what in EVENTS:
+        for what in report.events:
             simulated: PerSecond = getattr(one, f"{what}_simulated")
             real: PerSecond = getattr(one, f"{what}_real")
             count: Share = getattr(rate, what)
@@ -216,59 +254,3 @@ def _total(efforts: Sequence[Effort]) -> str:
     """The total times."""
     simulated, real = sum(e.simulated_s for e in efforts), sum(e.real_s for e in efforts)
     return f"{simulated:,.0f} s were simulated in {real:,.1f}"
-
-
-def _distinct(found: Sequence[Distinct], labels: Labels) -> Table:
-    """The numbers of distinct tests and failures."""
-    rows = []
-    for one in found:
-        for what in EVENTS:
-            diversity: Diversity = getattr(one, what)
-            rows.append([*labels.cells(one), what, *_diversity_cells(diversity)])
-    numbers = ("count", "cell known", "distinct", "estimated", "next is new")
-    notes = [
-        f"A cell: closing speed in steps of {SPEED_BIN:g} m/s, side of the ego, its way so far in "
-        f"steps of {PLACE_BIN:g} m, kind of tester; of tests at the trigger, of failures at the "
-        "impact.",
-        "Estimated: all cells there are, met or not, at least (Chao); next is new: by Good and "
-        "Turing.",
-    ]
-    missing = sum(d.total - d.known for one in found for d in (one.tests, one.failures))
-    if missing:
-        notes.append("Where no trace was kept the cell is not known.")
-    words = (*labels.titles, "")
-    return Table(
-        "distinct", "How many are distinct", words, numbers, rows, notes, heads=len(words) - 1
-    )
-
-
-def _diversity_cells(diversity: Diversity) -> list[str]:
-    """The numbers of distinct tests and failures of one group."""
-    estimate = "" if diversity.estimate is None else f"{diversity.estimate:.0f}"
-    counts = [diversity.total, diversity.known, diversity.cells]
-    return [*map(str, counts), estimate, percent(diversity.new)]
-
-
-def _failures(found: Sequence[FailureCell], several: bool) -> Table:
-    """The most frequent cells of failures, each with an example."""
-    rows = []
-    settings = any(one.cell.setting for one in found)
-    for one in found[:SHOWN]:
-        cell = one.cell
-        run = f"{one.file} {one.run}" if several else str(one.run)
-        speed = f"{cell.speed:g} to {cell.speed + SPEED_BIN:g}"
-        place = f"{cell.place:g} to {cell.place + PLACE_BIN:g}"
-        words = [cell.kind, cell.side, ", ".join(one.agents)]
-        words = [cell.setting, *words] if settings else words
-        rows.append([*words, speed, place, str(one.count), run])
-    words = ["tester", "hit on", "found by"]
-    notes = []
-    if len(found) > SHOWN:
-        rest = sum(one.count for one in found[SHOWN:])
-        notes.append(f"{rest} failures in {len(found) - SHOWN} more cells are not shown.")
-    notes.append(f"To see one: cavsumo replay {'RESULTS' if several else found[0].file} RUN")
-    numbers = ("at [m/s]", "after [m]", "failures", "run")
-    words = ["setting", *words] if settings else words
-    return Table(
-        "distinct", "Failures by cell, the most frequent first", words, numbers, rows, notes
-    )

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import csv
 import json
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path, PureWindowsPath
 from typing import TYPE_CHECKING, Any
 
@@ -76,6 +76,12 @@ def check_replaceable(csv_file: Path) -> None:
         raise ResultsError(
             f"{name}: an unfinished batch ({status}); --resume goes on, --overwrite starts again"
         )
+
+
+def check_apart(output: Path, parts: Sequence[Path]) -> None:
+    """Raise ResultsError where results would be written over one of the parts they are made of."""
+    if output.resolve() in [part.resolve() for part in parts]:
+        raise ResultsError(f"output {str(output)!r}: is one of the parts")
 
 
 def read_rows(csv_file: Path) -> list[dict[str, str]]:

@@ -6,6 +6,8 @@ import math
 from dataclasses import dataclass
 from typing import Literal
 
+Interval = tuple[float, float]
+
 
 @dataclass(frozen=True, slots=True)
 class Rate:

@@ -23,7 +23,7 @@ from cavsumo.report.pages.report.places import IMPACT, PASSED, Spot, maps, merge
 from cavsumo.report.pages.report.plots import Bar, ratios_plot, shares_plot, survival_plot
 from cavsumo.report.pages.report.scenes import scenes
 from cavsumo.report.pages.report.words import answers, certainty, excluded, headline
-from cavsumo.report.survival import kaplan_meier
+from cavsumo.results.kaplan_meier import kaplan_meier
 from cavsumo.results.reading import read_rows
 
 Page = Callable[..., str]
@@ -82,20 +82,21 @@ def test_the_answer_comes_first(tmp_path: Path) -> None:
 def test_the_page_tells_preventable_failures_blame_and_invalid_episodes(
     tmp_path: Path, page: Page
 ) -> None:
-    """With intervals and apart from errors; without judged failures there is no such plot."""
-    file = write(tmp_path / "judged.csv", JUDGED)
+    """With intervals and apart from errors; where nobody judged there is no such plot."""
+    file = write(tmp_path / "judged.csv", JUDGED, reference="human")
     report = analyse([file])
     first, second = (text.replace("\N{NO-BREAK SPACE}", " ") for text in answers(report))
     who = "preventable by a careful human driver (UN R157)"
-    assert first.endswith(f"; 2 {who}, 100.0 % [34.2, 100.0].")
-    assert second.endswith(f"; 1 of the 2 judged {who}, 50.0 % [9.5, 90.5].")
+    assert first.endswith(f"; 2 failures, 100.0 % [34.2, 100.0], {who}.")
+    apart = "apart from that 1 unpreventable, 1 not judged"
+    assert second.endswith(f"; 1 failure, 33.3 % [6.1, 79.2], {who}; {apart}.")
     assert "1 invalid: a tester broke the rules of the world" in excluded(report)
     assert excluded(report).endswith("Every episode could be played.")
     text = Words(page(file)).text
     assert f"Invalid: {file} run 0: tester0 left the world at 3.0 s" in text
-    assert "Preventable, of judged failures" in text
+    assert "Preventable failures, of tests" in text
     assert "tester:stepped-out" in text
-    assert "Preventable, of judged" not in Words(page(write(tmp_path / "some.csv", SOME))).text
+    assert "Preventable failures, of" not in Words(page(write(tmp_path / "some.csv", SOME))).text
 
 
 def test_nothing_found_is_an_answer(tmp_path: Path) -> None:

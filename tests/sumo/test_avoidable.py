@@ -445,9 +445,11 @@ def test_the_summary_says_how_many_were_preventable(
     row = rows(tmp_path / "r.csv")[0]
     if row["outcome"] == "violated":
         count = int(row["avoidable"])
-        assert f"1 failure, {count} of them preventable by a careful human driver (UN R157)" in said
+        many = "1 failure" if count else "0 failures"
+        assert f"{many} preventable by a careful human driver (UN R157)" in said
+        assert ("apart from that 1 unpreventable" in said) == (count == 0)
     else:
-        assert "preventable" not in said
+        assert "preventable by" not in said
 
 
 BLIND = r"""

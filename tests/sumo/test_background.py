@@ -166,7 +166,8 @@ def test_an_episode_is_the_same_whoever_is_read(
         assert fast.contacts.min_gap == full.contacts.min_gap
         assert fast.criticality.extremes() == full.criticality.extremes()
         assert fast.naturalness.turning == full.naturalness.turning
-        full.frames, full.actions = fast.frames, fast.actions  # kept where it is recorded
+        # Kept where it is recorded.
+        full.frames, full.actions, full.departures = fast.frames, fast.actions, fast.departures
         full.contacts, full.criticality, full.naturalness = (
             fast.contacts,
             fast.criticality,

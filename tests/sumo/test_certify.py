@@ -17,11 +17,11 @@ from cavsumo.batch.certify.certificate import as_json, certified, rounded_down, 
 from cavsumo.batch.certify.ego_list import opponents
 from cavsumo.batch.certify.tested_policy import Subject, of_policy, of_run, settings_of
 from cavsumo.batch.certify.used_seeds import SUMO_SEEDS, fresh_seed, used
+from cavsumo.batch.ended import Ended
 from cavsumo.batch.episode_runner import EpisodeRunner
 from cavsumo.batch.jobs import job
 from cavsumo.batch.prepared import prepare
 from cavsumo.batch.replay import recorded
-from cavsumo.batch.summary import Ended
 from cavsumo.batch.tally import Tally
 from cavsumo.cli import main
 from cavsumo.errors import Exit, InputError

@@ -20,12 +20,12 @@ BLOCK = re.compile(r"```python\n(.*?)```", re.DOTALL)
 
 
 def documented() -> dict[str, str]:
-    """The egos that README and docs show: the name of the class and the source of its module."""
+    """The egos that README and docs show as a module: the name of the class and the source."""
     found = {}
     for file in (ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))):
         for source in BLOCK.findall(file.read_text(encoding="utf-8")):
             for name in re.findall(r"^class (\w+)[^\n]*:\n", source, re.MULTILINE):
-                if "def act(self, snapshot):" in source:
+                if "def act(self, snapshot):" in source and "from cavsumo" in source:
                     found[name] = source
     return found
 
@@ -84,3 +84,38 @@ def test_the_empty_road_is_empty(networks: dict[str, Path], name: str) -> None:
         assert snapshot.testers == ()
         assert snapshot.raw_background == ()
         assert set(snapshot.lights) <= {"G"}
+
+
+def test_check_ego_says_what_passes_and_what_does_not(
+    networks: dict[str, Path], controller: Callable[..., str], capsys: pytest.CaptureFixture[str]
+) -> None:
+    """A line for each check, with the time and the number where it failed; exit status 0, 1, 2."""
+    name = controller(
+        "import time\nfrom cavsumo.egos import Acceleration\n"
+        "class Calm:\n"
+        "    def act(self, snapshot):\n"
+        "        return Acceleration(max(-3.0, min(2.0, 8.0 - snapshot.ego.v)))\n"
+        "class Late(Calm):\n"
+        "    def act(self, snapshot):\n"
+        "        return Acceleration(12.0) if snapshot.time > 2 else super().act(snapshot)\n"
+        "class Stuck(Calm):\n"
+        "    def act(self, snapshot):\n"
+        "        while snapshot.time > 400: time.sleep(0.1)\n"
+        "        return super().act(snapshot)\n"
+    )
+    on = ["-n", str(networks["pedestrians"])]
+    assert main(["check-ego", f"{name}:Calm", *on]) == 0
+    said = capsys.readouterr().out
+    assert said.count("ok    ") == len(ego_checks.CHECKS) + 1
+    assert "all passed" in said
+    assert main(["check-ego", f"{name}:Late", *on]) == 1
+    said = capsys.readouterr().out
+    assert "FAIL  empty road" in said
+    assert "at 2.10 s: value must lie in [-9, 9], got 12.0" in said
+    assert "FAIL  in SUMO" in said
+    assert main(["check-ego", f"{name}:Stuck", *on, "--deadline", "2"]) == 1
+    failed = [line for line in capsys.readouterr().out.splitlines() if "FAIL" in line]
+    assert [line[6:18] for line in failed] == ["long episode"]
+    assert failed[0].endswith("not done within 2 s")
+    assert main(["check-ego", f"{name}:Clam", *on]) == 2
+    assert "did you mean 'Calm'?" in capsys.readouterr().err

@@ -13,6 +13,7 @@ import pytest
 from inline import Done, cavsumo
 
 from cavsumo.results.columns import COLUMNS
+from cavsumo.results.failures import failure_kind, preventable_first
 from cavsumo.results.reading import read_rows
 
 CONTROLLERS = """
@@ -66,9 +67,10 @@ def failing(town: Path) -> dict[str, Done]:
 def test_an_ego_that_fails_is_exit_status_1(town: Path, failing: Mapping[str, Done]) -> None:
     """A script sees the failure, a reader the first one with the command that replays it."""
     assert failing["plain"].returncode == 1
-    failures = [r for r in read_rows(town / "plain.csv") if r["outcome"] == "violated"]
-    assert failures
-    assert f"first failure: run {failures[0]['run']} (timing): collision" in failing["plain"].stdout
+    failures = preventable_first(read_rows(town / "plain.csv"))
+    first = f"first {failure_kind(failures[0])} failure: run {failures[0]['run']} (timing): coll"
+    assert first in failing["plain"].stdout
+    assert "exit status 1: the ego violated an assertion, preventably in" in failing["plain"].stderr
     assert f"cavsumo replay plain.csv {failures[0]['run']}" in failing["plain"].stdout
     assert (town / failures[0]["trace"]).is_file()
 

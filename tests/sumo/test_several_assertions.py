@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 from xml.etree import ElementTree
 
@@ -109,8 +110,12 @@ def test_a_batch(
     assert set(cases) == set(NAMES)
     failed = cases["stopping-distance"].find("failure")
     assert failed is not None
-    told = f"{counted['stopping-distance'][VIOLATED]} of "
-    assert str(failed.get("message")).startswith(told)
+    own = [row for row in rows if row["assertion"] == "stopping-distance"]
+    preventable = sum(row["avoidable"] == "1" for row in own)
+    said = str(failed.get("message"))
+    assert re.match(rf"{preventable} failures? of \d+ tests preventable by a careful human", said)
+    not_judged = counted["stopping-distance"][VIOLATED] - len(own)
+    assert (f"{not_judged} not judged" in said) == (not_judged > 0)
     assert main(["replay", "results.csv", "0"]) in (0, 1)
     capsys.readouterr()
     assert main(["run", "-n", net, "-r", "none", *words[:-1], "--overwrite"]) == 0

@@ -21,6 +21,7 @@ from cavsumo.batch.stopping import looks_at_rows
 from cavsumo.cli import main
 from cavsumo.errors import InputError
 from cavsumo.model.scenario import plan_from
+from cavsumo.results.failures import failure_kind
 from cavsumo.results.reading import read_manifest
 from cavsumo.results.statistics import rate, sequential_rate
 from cavsumo.results.writing import Recorder
@@ -90,7 +91,7 @@ def outcomes(found: list[dict[str, str]]) -> list[str]:
 @pytest.mark.parametrize(
     ("rules", "said"),
     [
-        ({"first": True}, "first failure: run "),
+        ({"first": True}, "first preventable failure: run "),
         ({"until_tests": 5}, "5 tests found"),
         ({"until_half_width": "0.4"}, "rate of tests known to a half-width of 0.4"),
         ({"until_half_width": "95%"}, "rate of tests known to a half-width of 95%"),
@@ -120,10 +121,10 @@ def test_a_rule_stops_at_the_same_row_for_any_number_of_processes(
 def test_a_batch_stops_at_the_first_failure_and_not_before(
     stopped: Play, full: list[dict[str, str]]
 ) -> None:
-    """The last row is the only failure."""
-    found = outcomes(rows(stopped(first=True)))
-    assert found.index("violated") == len(found) - 1
-    assert "violated" in outcomes(full)
+    """The last row is the only preventable failure."""
+    kinds = [failure_kind(row) for row in rows(stopped(first=True))]
+    assert kinds.index("preventable") == len(kinds) - 1
+    assert "preventable" in map(failure_kind, full)
 
 
 def test_a_batch_stops_with_the_test_that_was_wanted(stopped: Play) -> None:

@@ -2,18 +2,14 @@
 
 from __future__ import annotations
 
-import csv
 import dataclasses
 import json
 import math
-import subprocess
-import sys
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
-from support import STRAIGHT_NET
 
 from cavsumo.agents import AGENTS
 from cavsumo.agents.planning import response, solving
@@ -278,44 +274,3 @@ def test_a_file_without_counts_is_refused(tmp_path: Path, text: str) -> None:
     file.write_text(text)
     with pytest.raises(InputError, match="expected the manifest of a batch"):
         AGENTS.make("best-response", {"model": str(file)})
-
-
-def cavsumo(*words: object) -> subprocess.CompletedProcess[str]:
-    """A command, in a process of its own."""
-    return subprocess.run(
-        [sys.executable, "-m", "cavsumo", *map(str, words)],
-        capture_output=True, text=True, timeout=300, check=False,
-    )  # fmt: skip
-
-
-def test_it_learns_and_what_it_learned_is_played_frozen(tmp_path: Path) -> None:
-    """Two episodes teach it how SUMO's driver decides; the manifest is the model of other batches.
-
-    The ego decides in every timestep here, so that there is but one age and the plan is small.
-    """
-    base = ("--net", STRAIGHT_NET, "--agent", "best-response", "--testers", 2)
-    base += (
-        "--ego-param",
-        "actionStepLength=0",
-        "--trace",
-        "none",
-        "-q",
-        "--exit-zero",
-        "--step-length",
-        0.2,
-    )
-    first, second = tmp_path / "first.csv", tmp_path / "second.csv"
-    taught = cavsumo("run", *base, "--runs", 2, "--seed", 101, "-o", first)
-    assert taught.returncode == 0, taught.stderr
-    model = json.loads(first.with_suffix(".json").read_text())["learned"]["best-response"][0]
-    assert model["episodes"] == 2
-    counts = Counts.of(model["counts"])
-    assert sum(map(sum, counts.taken.values())) > 50
-    frozen = ("--param", "learn=false", "--param", f"model={first.with_suffix('.json')}")
-    played = cavsumo("run", *base, *frozen, "--runs", 2, "-j", 2, "-o", second)
-    assert played.returncode == 0, played.stderr
-    with second.open(encoding="utf-8") as rows:
-        assert all(row["outcome"] != "error" for row in csv.DictReader(rows))
-    manifest = json.loads(second.with_suffix(".json").read_text())
-    assert str(first.with_suffix(".json")) in manifest["sha256"]
-    assert "best-response" not in manifest.get("learned", {})

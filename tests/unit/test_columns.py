@@ -7,8 +7,10 @@ from support import ROOT
 
 from cavsumo.assertions.base import Judgement
 from cavsumo.batch.jobs import Job, finished
+from cavsumo.batch.replay import first_difference
 from cavsumo.model.scenario import BatchPlan, plan_from
 from cavsumo.results.columns import COLUMNS, markdown_table, measured, row_of
+from cavsumo.results.rows import cell
 from cavsumo.simulation.loop import Episode
 
 UNITS = {"s": "s", "m": "m", "mps": "m/s", "mps2": "m/s²", "rad": "rad"}
@@ -65,3 +67,13 @@ def test_what_an_episode_fills_is_the_same_in_a_row(plan: BatchPlan) -> None:
     assert figures == {name: row[name] for name in figures}
     assert {"run", "agent", "avoidable", "error", "wall_s"} & set(figures) == set()
     assert (figures["outcome"], figures["steps"]) == ("not_triggered", 4)
+
+
+def test_a_record_from_before_a_column_is_the_same(plan: BatchPlan) -> None:
+    """A trace of an older version says nothing of it; what it does say must agree."""
+    again = row_of(finished(plan, Job(3, "noop", 17), Episode(Judgement("reaction-zone"))))
+    record = {name: cell(value) for name, value in again.items() if name != "frozen"}
+    assert first_difference(record, None, again, ()) is None
+    found = first_difference(record | {"steps": "7"}, None, again, ())
+    assert found is not None
+    assert found.quantity == "steps"

@@ -5,10 +5,11 @@ from __future__ import annotations
 import dataclasses
 import math
 import random
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import Any, ClassVar
 
 import pytest
+from sites import encounters_once
 from support import ROOT
 
 from cavsumo.agents import AGENTS, Agent
@@ -18,7 +19,6 @@ from cavsumo.assertions import ASSERTIONS, Assertion
 from cavsumo.assertions.base import UNFAIR, Judgement
 from cavsumo.assertions.collision import CollisionAssertion
 from cavsumo.assertions.contacts import Contact
-from cavsumo.cli import main
 from cavsumo.egos import EGOS, Acceleration, Command, Ego, make_ego
 from cavsumo.egos.base import EGO_KIND, Mission
 from cavsumo.egos.time_gap import TimeGapEgo
@@ -79,6 +79,13 @@ class TestOurAssertions(AssertionContract):
 
     def make(self) -> Assertion:
         return ASSERTIONS.make(self.name, {})
+
+
+@pytest.fixture(scope="module", autouse=True)
+def _encounters_once() -> Iterator[None]:
+    """All assertions are shown the same encounters, which are made once."""
+    with encounters_once():
+        yield
 
 
 # What breaks a contract is found by the check that is meant for it.
@@ -280,37 +287,3 @@ def failures(checks: Mapping[str, Any], make: Callable[[], Any]) -> str:
         except (AssertionError, EgoError, ValueError):
             failed.append(name)
     return ", ".join(failed)
-
-
-def test_check_ego_says_what_passes_and_what_does_not(
-    controller: Callable[..., str], capsys: pytest.CaptureFixture[str]
-) -> None:
-    """A line for each check, with the time and the number where it failed; exit status 0, 1, 2."""
-    name = controller(
-        "from cavsumo.egos import Acceleration\n"
-        "class Calm:\n"
-        "    def act(self, snapshot):\n"
-        "        return Acceleration(max(-3.0, min(2.0, 8.0 - snapshot.ego.v)))\n"
-        "class Late(Calm):\n"
-        "    def act(self, snapshot):\n"
-        "        return Acceleration(12.0) if snapshot.time > 2 else super().act(snapshot)\n"
-        "class Stuck(Calm):\n"
-        "    def act(self, snapshot):\n"
-        "        while snapshot.time > 400: pass\n"
-        "        return super().act(snapshot)\n"
-    )
-    assert main(["check-ego", f"{name}:Calm", "-n", str(NET)]) == 0
-    said = capsys.readouterr().out
-    assert said.count("ok    ") == len(ego_checks.CHECKS) + 1
-    assert "all passed" in said
-    assert main(["check-ego", f"{name}:Late", "-n", str(NET)]) == 1
-    said = capsys.readouterr().out
-    assert "FAIL  empty road" in said
-    assert "at 2.10 s: value must lie in [-9, 9], got 12.0" in said
-    assert "FAIL  in SUMO" in said
-    assert main(["check-ego", f"{name}:Stuck", "-n", str(NET), "--deadline", "5"]) == 1
-    failed = [line for line in capsys.readouterr().out.splitlines() if "FAIL" in line]
-    assert [line[6:18] for line in failed] == ["long episode"]
-    assert failed[0].endswith("not done within 5 s")
-    assert main(["check-ego", f"{name}:Clam", "-n", str(NET)]) == 2
-    assert "did you mean 'Calm'?" in capsys.readouterr().err

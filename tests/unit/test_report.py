@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import dataclasses
 import io
 import itertools
 import json
@@ -17,8 +18,9 @@ from report_files import ERROR, FAILED, HELD, JUDGED, NOTHING, SOME, UNFAIR, wri
 from cavsumo.cli import main
 from cavsumo.errors import InputError
 from cavsumo.report.analysis import Report, analyse
-from cavsumo.report.events import side_ahead, side_hit
-from cavsumo.report.formats import FORMATS
+from cavsumo.report.distinct import Cell, FailureCell, failure_cells
+from cavsumo.report.events import Described, Event, side_ahead, side_hit
+from cavsumo.report.formats import FORMATS, as_table
 from cavsumo.results.columns import COLUMNS
 from cavsumo.results.reading import read_rows
 from cavsumo.results.traces import read_moments, read_trace, trace_text
@@ -142,11 +144,12 @@ def test_shares_by_hand(some: Report) -> None:
 
 
 def test_what_could_have_been_avoided_and_who_is_to_blame(tmp_path: Path, says: Says) -> None:
-    """Of the failures that were judged; a failure without a rule broken counts too."""
-    file = write(tmp_path / "judged.csv", JUDGED)
+    """Of the tests, apart from other failures; a failure without a rule broken counts too."""
+    file = write(tmp_path / "judged.csv", JUDGED, reference="human")
     random, timing = analyse([file]).rates
     assert (random.preventable.count, random.preventable.total) == (2, 2)
-    assert (timing.preventable.count, timing.preventable.total) == (1, 2)
+    assert (timing.preventable.count, timing.preventable.total) == (1, 3)
+    assert (timing.unpreventable.count, timing.not_judged, timing.failures.count) == (1, 1, 3)
     assert timing.reference == "human"
     assert {rule: share.count for rule, share in random.blame.items()} == {"ego:speed": 2}
     assert {rule: share.count for rule, share in timing.blame.items()} == {
@@ -155,7 +158,9 @@ def test_what_could_have_been_avoided_and_who_is_to_blame(tmp_path: Path, says: 
     }
     assert {share.total for share in timing.blame.values()} == {3}
     lines = [line.split() for line in says(file).splitlines()]
-    assert ["preventable", "(human)", "1", "of", "2", "judged"] in [line[:6] for line in lines]
+    assert ["timing", "preventable", "(human)", "1", "of", "3", "tests"] in [x[:7] for x in lines]
+    assert ["unpreventable", "1", "of", "3", "tests"] in [line[:5] for line in lines]
+    assert ["not", "judged", "1", "of", "3", "failures"] in lines
     assert ["tester:stepped-out", "1", "of", "3", "failures"] in [line[:5] for line in lines]
     assert ["invalid", "1", "of", "3", "episodes"] in lines
     data = json.loads(says(file, "--format", "json"))
@@ -165,7 +170,7 @@ def test_what_could_have_been_avoided_and_who_is_to_blame(tmp_path: Path, says: 
 
 def test_pairs_leave_out_what_either_could_not_play(some: Report) -> None:
     """Of four seeds one is an error of random's: three pairs; the later agent comes first."""
-    tests, failures = some.comparisons
+    failures, tests = some.comparisons
     assert (tests.first, tests.second, tests.event) == ("timing", "random", "tests")
     assert tests.pairs == (1, 2, 0, 0)
     assert tests.ratio == 3.0
@@ -180,11 +185,11 @@ def test_times_by_hand(some: Report) -> None:
     assert list(random.curve.times) == [4.0, 22.0, 24.0]  # test, nothing, unfair
     assert list(random.curve.share) == pytest.approx([2 / 3] * 3)
     assert random.median is None
-    assert (random.first_test, random.first_failure) == (1, None)
+    assert (random.first_test, random.first_failure) == (("some.csv", 0), None)
     assert timing.curve is not None
     assert list(timing.curve.times) == [5.0, 7.0, 9.0, 11.0]
     assert timing.median == 7.0
-    assert (timing.first_test, timing.first_failure) == (1, 2)
+    assert (timing.first_test, timing.first_failure) == (("some.csv", 1), ("some.csv", 3))
     assert timing.limit == random.limit == 11.0
 
 
@@ -445,6 +450,30 @@ def test_sides_of_the_ego(turn: float, ahead: float, left: float, hit: str, zone
     assert side_ahead(ego, other) == zone
 
 
+@pytest.mark.parametrize(
+    ("cells", "said"),
+    [
+        (11, "1 failure in 1 more cell is not shown."),
+        (12, "2 failures in 2 more cells are not shown."),
+    ],
+)
+def test_the_rest_of_the_cells_is_counted_in_words(some: Report, cells: int, said: str) -> None:
+    """One failure in one cell is a singular."""
+    places = [Cell("", "pedestrian", "front", 2.0 * i, 10.0) for i in range(cells)]
+    found = [FailureCell(cell, 1, 0, "some.csv", i, ("a",)) for i, cell in enumerate(places)]
+    assert said in as_table(dataclasses.replace(some, failures=found))
+
+
+def test_failures_that_are_preventable_come_first_in_cells_and_runs(tmp_path: Path) -> None:
+    """A cell that was preventable once stands before one that never was, with that run."""
+    file = write(tmp_path / "r.csv", JUDGED, reference="human")
+    report = analyse([file])
+    where = Event(3.0, "front", 20.0, 0.0, 0.0)
+    tests = {i: Described(where, where) for i in report.tests}
+    (cell,) = failure_cells(report.groups, tests, report.evidence.batches)
+    assert (cell.count, cell.preventable, cell.run) == (5, 3, 1)
+
+
 # JUnit
 
 
@@ -509,10 +538,10 @@ def test_the_csv_and_the_json_hold_the_same_figures(tmp_path: Path, says: Says) 
     )
     assert float(found["value"]) == share["value"]
     assert [float(found["low"]), float(found["high"])] == share["intervals"]["Clopper-Pearson"]
-    ratio = next(line for line in lines if line["quantity"] == "ratio")
+    ratio = [line for line in lines if line["quantity"] == "ratio"][1]
     assert (ratio["section"], ratio["group"]) == ("comparison of tests", "timing : random")
-    assert float(ratio["value"]) == data["comparisons"][0]["ratio"] == 3.0
-    assert data["comparisons"][1]["interval"][1] is None  # no bound above
+    assert float(ratio["value"]) == data["comparisons"][1]["ratio"] == 3.0
+    assert data["comparisons"][0]["interval"][1] is None  # no bound above
     assert data["format"] == "cavsumo-report-1"
 
 

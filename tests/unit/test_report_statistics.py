@@ -29,7 +29,12 @@ from cavsumo.report.pairs import (
     sequential_mcnemar,
     sequential_ratio_interval,
 )
-from cavsumo.report.survival import Curve, kaplan_meier, median, restricted_mean
+from cavsumo.results.kaplan_meier import (
+    Curve,
+    kaplan_meier,
+    median_time_to_test,
+    restricted_mean,
+)
 from cavsumo.results.statistics import rate, sequential_p, sequential_rate
 
 CALM = settings(deadline=None, max_examples=50)
@@ -260,8 +265,8 @@ def test_the_remission_of_leukaemia() -> None:
     published = {6: 0.857, 7: 0.807, 10: 0.753, 13: 0.690, 16: 0.627, 22: 0.538, 23: 0.448}
     assert {t: after[t] for t in published} == pytest.approx(published, abs=6e-4)
     # the limits by log(-log), as R's survival gives them
-    assert median(treated) == (23.0, (13.0, math.inf))
-    assert median(placebo) == (8.0, (4.0, 11.0))
+    assert median_time_to_test(treated) == (23.0, (13.0, math.inf))
+    assert median_time_to_test(placebo) == (8.0, (4.0, 11.0))
 
 
 @pytest.mark.parametrize("seed", range(5))
@@ -280,7 +285,7 @@ def test_curves_are_those_of_statsmodels(seed: int) -> None:
     spread = 1.959964 * error[inside] / (share[inside] * np.abs(np.log(share[inside])))
     for ends, power in ((found.low, np.exp(spread)), (found.high, np.exp(-spread))):
         assert ends[at][inside] == pytest.approx(share[inside] ** power, abs=1e-6)
-    assert median(found)[0] == there.quantile(0.5)
+    assert median_time_to_test(found)[0] == there.quantile(0.5)
 
 
 def test_the_mean_up_to_a_limit_by_hand() -> None:
@@ -305,7 +310,7 @@ def test_means_and_medians_lie_in_their_intervals_often_enough() -> None:
         assert found is not None
         span = restricted_mean(found, limit)[1]
         means += span is not None and span[0] <= true_mean <= span[1]
-        span = median(found)[1]
+        span = median_time_to_test(found)[1]
         medians += span is not None and span[0] <= true_median <= span[1]
     assert 0.91 <= means / 300 <= 0.98
     assert 0.91 <= medians / 300 <= 0.99
@@ -319,7 +324,7 @@ def test_few_times(ended: list[float], censored: list[float], expected: object) 
     """No test at all, one test, tests at the very start: an answer without a warning."""
     with warnings.catch_warnings():
         warnings.simplefilter("error")
-        found = median(curve(ended, censored))
+        found = median_time_to_test(curve(ended, censored))
     if expected is not None:
         assert found == expected
     assert kaplan_meier(np.array([]), np.array([], bool)) is None

@@ -16,7 +16,7 @@ from typing import Any
 
 from rich.table import Table
 
-from cavsumo.batch.summary import Ended
+from cavsumo.batch.ended import Ended
 from cavsumo.batch.tally import Found
 from cavsumo.results.reading import rows_of
 from cavsumo.results.statistics import lower_bound

@@ -7,12 +7,15 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+from cavsumo.batch import sentences
+from cavsumo.batch.ended import Ended
 from cavsumo.batch.manner import Manner as Manner
 from cavsumo.batch.manner import Means
 from cavsumo.batch.planned import PlannedBatch, planned
 from cavsumo.batch.playing import played
 from cavsumo.batch.preflight import CheckedBatch, prepared_batches
-from cavsumo.batch.summary import Ended, summarise
+from cavsumo.batch.summary import summarise
+from cavsumo.batch.tally import found_by
 from cavsumo.egos import make_ego
 from cavsumo.errors import Exit
 from cavsumo.model.study import Part
@@ -30,13 +33,20 @@ def run_study(batches: Sequence[PlannedBatch], means: Means, manner: Manner) -> 
         if batch.replaced:
             print(_replacement(batch), file=sys.stderr)
     ended, interrupted = played(checked, means, manner, announce)
+    status = exit_status(ended, interrupted, manner.exit_zero)
     if not manner.quiet:
         summarise(ended)
-    return exit_status(ended, interrupted, manner.exit_zero)
+        if status == Exit.VIOLATED:
+            print(f"cavsumo: exit status {status:d}: {_reason(ended)}", file=sys.stderr)
+    return status
 
 
 def exit_status(ended: Sequence[Ended], interrupted: bool, exit_zero: bool) -> int:
-    """130 interrupted, 3 an episode could not be run, 1 the ego violated an assertion, else 0."""
+    """130 interrupted, 3 an episode could not be run, 1 the ego violated an assertion, else 0.
+
+    It is 1 whether that was preventable or not: what the ego did is known, what another driver
+    would have done is a judgement.
+    """
     if interrupted:
         return Exit.INTERRUPTED
     found = [one.tally.all for one in ended]
@@ -44,6 +54,12 @@ def exit_status(ended: Sequence[Ended], interrupted: bool, exit_zero: bool) -> i
         return Exit.NOT_RUN
     violated = any(one.failures for one in found)
     return Exit.VIOLATED if violated and not exit_zero else Exit.OK
+
+
+def _reason(ended: Sequence[Ended]) -> str:
+    """The meaning of exit status 1, the preventable failures first."""
+    judged = all(one.judged for one in ended)
+    return sentences.exit_reason(found_by(one.tally.all for one in ended), judged)
 
 
 def announce(batch: CheckedBatch, jobs: int) -> None:

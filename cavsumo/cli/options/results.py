@@ -123,8 +123,9 @@ def _report(options: argparse.Namespace) -> int:
 
 
 def _merge(options: argparse.Namespace) -> int:
-    from cavsumo.results.reading import read_manifest
+    from cavsumo.results.reading import check_apart, read_manifest
 
+    check_apart(options.output, options.parts)
     for part in options.parts:
         read_manifest(part)
     from cavsumo.cli.commands.merge import merge

@@ -70,7 +70,7 @@ def _add_output(add: Callable[..., Any]) -> None:
     add("--resume", action="store_true", help="go on where the results end, or start")
     add("--retry-errors", action="store_true", help="play the episodes again that ended in errors")
     add("--overwrite", action="store_true", help="start again in place of what is there")
-    add("--exit-zero", action="store_true", help="a violation is no failure")
+    add("--exit-zero", action="store_true", help="exit with 0 although the ego failed")
     add("-q", "--quiet", action="store_true", help="no progress, no summary")
 
 

@@ -69,7 +69,9 @@ class BatchPlan(BaseModel):
         description="play part I of N of the episodes; cavsumo merge puts the parts together",
     )
     first: Annotated[bool, Option("stopping early", ("-x", "--first"))] = Field(
-        False, description="stop at the first failure"
+        False,
+        description="stop at the first failure (with a reference driver: the first preventable "
+        "one)",
     )
     until_tests: Annotated[int | None, Option("stopping early", metavar="N")] = Field(
         None, ge=1, description="stop after N tests"
@@ -78,8 +80,12 @@ class BatchPlan(BaseModel):
         None,
         description="stop when every agent's rate is known to H, such as 0.02, or 10% of the rate",
     )
-    until_rate: Annotated[Literal["tests", "failures"], Option("stopping early")] = Field(
-        "tests", description="the rate meant: tests among episodes, or failures among tests"
+    until_rate: Annotated[Literal["tests", "preventable", "failures"], Option("stopping early")] = (
+        Field(
+            "tests",
+            description="the rate meant: tests among episodes, preventable failures or all "
+            "failures among tests",
+        )
     )
     budget_s: Annotated[Finite | None, Option("stopping early", ("--budget",), "S", "no limit")] = (
         Field(None, gt=0, description="stop after so much real time [s]")
@@ -105,6 +111,13 @@ class BatchPlan(BaseModel):
     def _well_formed(cls, value: str | None, info: ValidationInfo) -> str | None:
         if value is not None:
             part_of(value) if info.field_name == "shard" else half_width(value)
+        return value
+
+    @field_validator("until_rate")
+    @classmethod
+    def _judged(cls, value: str, info: ValidationInfo) -> str:
+        if value == "preventable" and info.data.get("reference") == "none":
+            raise ValueError("preventable needs a reference driver, and reference is none")
         return value
 
     @field_validator("agents")

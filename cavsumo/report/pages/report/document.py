@@ -13,7 +13,7 @@ from markupsafe import Markup
 from cavsumo.batch.summary import percent
 from cavsumo.report.analysis import Report
 from cavsumo.report.cells import TOPICS, Table, number
-from cavsumo.report.compare import EVENTS, PairedComparison
+from cavsumo.report.compare import WORDS, PairedComparison
 from cavsumo.report.pages.report import words
 from cavsumo.report.pages.report.links import LinkedRun, chosen, with_pages, write_pages
 from cavsumo.report.pages.report.places import MEANING, Map, maps
@@ -29,22 +29,17 @@ from cavsumo.report.pages.report.plots import (
 from cavsumo.report.pages.report.scenes import BatchPlace, scenes
 from cavsumo.report.pages.shell import render, write
 from cavsumo.report.rates import Share
-from cavsumo.report.survival import Curve
 from cavsumo.report.tables import tables
+from cavsumo.results.kaplan_meier import Curve
 
 FILES = Path(__file__).parent
+COUNTED = ("tests", "failures")  # in the titles of lists of runs
 LINES = 30  # of a plot; the tables have all
-OF = {
-    "tests": "of valid episodes",
-    "failures": "of tests",
-    "unfair": "of valid episodes",
-    "preventable": "of judged failures",
-}
 TITLES = {
-    "tests": "Tests found",
-    "failures": "Failed by the ego",
-    "unfair": "Unfair",
-    "preventable": "Preventable",
+    "preventable": "Preventable failures, of tests",
+    "failures": "Failed by the ego, of tests",
+    "tests": "Tests found, of valid episodes",
+    "unfair": "Unfair, of valid episodes",
 }
 
 
@@ -109,7 +104,7 @@ def page(
         sorts=MEANING,
         failures=failures,
         tests=tests,
-        totals={what: sum(getattr(one, what).count for one in report.rates) for what in EVENTS},
+        totals={what: sum(getattr(one, what).count for one in report.rates) for what in COUNTED},
         problems=list(dict.fromkeys(scene.problem for scene in played if scene.problem)),
         several=any(group.setting for group in report.groups),
         beside=quote(folder),
@@ -117,22 +112,20 @@ def page(
 
 
 def _shares(report: Report) -> Iterator[Plot]:
-    """Interval bars of each kind of share, a line for each group; none without judged episodes."""
-    for what, title in TITLES.items():
+    """Interval bars of each kind of share, a line for each group, the leading failures first."""
+    for what in (*report.events, "unfair"):
         bars = []
-        if what == "preventable" and not any(one.preventable.total for one in report.rates):
-            continue
         for one in report.rates[:LINES]:
             share: Share = getattr(one, what)
             text = percent(share.value)
             bars.append(share_bar(words.label(one, report.by), share, text))
         if bars:
-            yield _plot(f"{title}, {OF[what]}", shares_plot, bars, len(report.rates))
+            yield _plot(TITLES[what], shares_plot, bars, len(report.rates))
 
 
 def _ratios(report: Report) -> Iterator[Plot]:
     """Interval bars of the ratios of tests and of failures."""
-    for what in EVENTS:
+    for what in report.events:
         found = [one for one in report.comparisons if one.event == what]
         bars = []
         for one in found[:LINES]:
@@ -140,7 +133,7 @@ def _ratios(report: Report) -> Iterator[Plot]:
             name = words.JOINT.join((*where, f"{one.first or '(none)'} : {one.second or '(none)'}"))
             bars.append(ratio_bar(name, one, _ratio(one)))
         if bars:
-            title = f"{what.capitalize()}: how many times as often"
+            title = f"{WORDS.get(what, what).capitalize()}: how many times as often"
             yield _plot(title, ratios_plot, bars, len(found))
 
 

@@ -1,4 +1,4 @@
-"""Runs for inspection: failures, one of each kind first, and some tests that the ego passed.
+"""Runs worth looking at: failures, preventable ones and one of each cell first, and passed tests.
 
 The first of them are written as pages of their own, from their traces, without playing them again.
 """
@@ -19,6 +19,7 @@ from cavsumo.report.analysis import Report
 from cavsumo.report.load import Batch
 from cavsumo.report.pages.replay.page import write_page
 from cavsumo.report.pages.report.scenes import BatchPlace
+from cavsumo.results.failures import ORDER, failure_kind
 from cavsumo.results.reading import inside, whole_lines
 from cavsumo.results.traces import read_trace
 
@@ -34,7 +35,8 @@ class LinkedRun:
         index: of its row in the evidence.
         batch, run, agent, tester, setting: its identity.
         failed: whether the ego failed.
-        time, speed: time of the trigger or failure [s]; closing speed then [m/s], None if unknown.
+        kind: of failure, empty for none (``failures.failure_kind``).
+        time, speed: when it was triggered or failed [s]; closing speed then [m/s], None if unknown.
         alike: failures of its kind, itself included; None unless it is the first of them.
         command: the command that replays it.
         page: the name of its page, empty without one.
@@ -47,6 +49,7 @@ class LinkedRun:
     tester: str
     setting: str
     failed: bool
+    kind: str
     time: float
     speed: float | None
     alike: int | None
@@ -62,7 +65,8 @@ def chosen(report: Report, pages: int) -> tuple[list[LinkedRun], list[LinkedRun]
     alike = {(cell.file, cell.run): cell.count for cell in report.failures}
     firsts = {key: rank for rank, key in enumerate(alike)}
     keys = list(zip(failures["file"], failures["run"], strict=True))
-    order = sorted(range(len(keys)), key=lambda i: (firsts.get(keys[i], len(firsts)), i))
+    kinds = [ORDER.index(failure_kind(row)) for row in failures.to_dict("records")]
+    order = sorted(range(len(keys)), key=lambda i: (kinds[i], firsts.get(keys[i], len(firsts)), i))
     picked = failures.iloc[order[: max(FAILURES, pages)]]
     spread = np.linspace(0, len(tests) - 1, min(len(tests), pages // 2 or TESTS))
     return (
@@ -91,6 +95,7 @@ def _looks(
             tester=row.tester,
             setting=settings[int(row.Index)],
             failed=failed,
+            kind=failure_kind(row._asdict()),
             time=float(row.violation_time_s if failed else row.trigger_time_s),
             speed=event.speed,
             alike=alike.get((row.file, run)),

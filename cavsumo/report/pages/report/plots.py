@@ -23,7 +23,7 @@ from matplotlib.ticker import MaxNLocator
 from cavsumo.report.compare import PairedComparison
 from cavsumo.report.pages.report.words import JOINT
 from cavsumo.report.rates import Share
-from cavsumo.report.survival import Curve
+from cavsumo.results.kaplan_meier import Curve
 
 WIDTH_IN = 3.6  # as narrow as a phone, so that text is as large there as elsewhere
 ROW_IN, FRAME_IN = 0.26, 0.3  # height of a line of bars, and of the space around them

@@ -5,8 +5,8 @@ from __future__ import annotations
 import shlex
 from collections.abc import Iterator, Sequence
 
+from cavsumo.batch.sentences import driver
 from cavsumo.batch.summary import interval, percent
-from cavsumo.egos.reference import REFERENCES
 from cavsumo.errors import CavsumoError
 from cavsumo.model.scenario import Scenario
 from cavsumo.report.analysis import Report
@@ -57,33 +57,36 @@ def answers(report: Report) -> list[str]:
     found = [answer(one, _who(one, report.by)) for one in report.rates[:ANSWERS]]
     if len(report.rates) > ANSWERS:
         found.append(f"{len(report.rates) - ANSWERS} more groups are in the table.")
+    for drive in report.driving[:ANSWERS]:
+        if drive.warning:
+            found.append(f"{_who(drive, report.by)}: {drive.warning}.")
     return found or ["The results hold no episodes yet."]
 
 
 def answer(one: Rates, who: str) -> str:
     """The results of a group, as a sentence."""
-    tests, failures = one.tests, one.failures
+    tests, failures = one.tests, one.preventable if one.reference else one.failures
     if not tests.total:
         return f"{who} played no valid episode."
     if not tests.count:
         return f"{who} found no test in {_many(tests.total, 'episode')}, {_share(tests)}."
     found = f"{who} found {_many(tests.count, 'test')} in {_many(tests.total, 'episode')}"
     found += f", {_share(tests)}"
+    if one.reference and one.failures.count:
+        return f"{found}; {_many(failures.count, 'failure')}, {_share(failures)}, {_judged(one)}."
     if not failures.count:
         passed = "it" if tests.count == 1 else "all of them"
         return f"{found}; the ego passed {passed}: it failed {_share(failures)}."
     of = "it" if tests.count == 1 else f"{failures.count} of them"
-    return f"{found}; the ego failed {of}, {_share(failures)}{_preventable(one)}."
+    return f"{found}; the ego failed {of}, {_share(failures)}."
 
 
-def _preventable(one: Rates) -> str:
-    """The number of preventable failures, if they were judged."""
-    judged = one.preventable
-    if not judged.total:
-        return ""
-    who = REFERENCES.make(one.reference, {}).words if one.reference in REFERENCES else one.reference
-    of = "" if judged.total == one.failures.count else f" of the {judged.total} judged"
-    return f"; {judged.count}{of} preventable by {who}, {_share(judged)}"
+def _judged(one: Rates) -> str:
+    """The driver that would have prevented the failures, and apart from them the others."""
+    others = ((one.unpreventable.count, "unpreventable"), (one.not_judged, "not judged"))
+    apart = ", ".join(f"{count} {kind}" for count, kind in others if count)
+    said = f"preventable by {driver(one.reference)}"
+    return f"{said}; apart from that {apart}" if apart else said
 
 
 def certainty(report: Report) -> str:

@@ -1,0 +1,265 @@
+"""Every script of benchmarks/ and experiments/, played once at its smallest size."""
+
+from __future__ import annotations
+
+import importlib
+import importlib.util
+import re
+import sys
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+import pytest
+from inline import cavsumo
+from support import CHROMIUM, ROOT, benchmark
+
+from cavsumo.assertions import criticality_monitor
+
+pytestmark = pytest.mark.usefixtures("inline")
+NET = str(ROOT / "networks" / "pedestrians.net.xml")
+Play = Callable[..., str]
+
+
+@pytest.fixture
+def play(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> Iterator[Play]:
+    """Call with a benchmark, its words and values of its constants: what it prints."""
+    monkeypatch.syspath_prepend(str(ROOT / "benchmarks"))
+    monkeypatch.setenv("OPENBLAS_NUM_THREADS", "1")
+
+    loaded: list[str] = []
+
+    def played(name: str, *words: str, **constants: Any) -> str:
+        monkeypatch.delitem(sys.modules, name, raising=False)
+        module = importlib.import_module(name)
+        loaded.append(name)
+        for constant, value in constants.items():
+            assert hasattr(module, constant)
+            monkeypatch.setattr(module, constant, value)
+        monkeypatch.setattr(sys, "argv", [f"{name}.py", *words])
+        module.main()
+        return capsys.readouterr().out
+
+    yield played
+    for name in loaded:
+        sys.modules.pop(name, None)
+
+
+def numbers(line: str) -> list[float]:
+    """The numbers in a line."""
+    return [float(word) for word in re.findall(r"-?\d+\.?\d*(?:e[-+]\d+)?", line)]
+
+
+LIBRARIES = {"rings": "test_games.py", "storm": "test_games_random.py"}
+
+
+def test_every_benchmark_is_played_here() -> None:
+    """Scripts that are added get a test, too; two are libraries of others."""
+    here = Path(__file__).read_text(encoding="utf-8")
+    scripts = {file.stem for file in (ROOT / "benchmarks").glob("*.py")} - set(LIBRARIES)
+    assert scripts == set(re.findall(r'play\(\s*"(\w+)"', here))
+
+
+def test_avoidable(play: Play) -> None:
+    """One ego, one agent, both reference drivers."""
+    said = play("avoidable", "--runs", "1", "-j", "1", EGOS=("constant",), AGENTS=("random",))
+    assert [line.split()[:2] for line in said.splitlines()[1:]] == [
+        ["constant", "random"],
+        ["constant", "all"],
+    ]
+
+
+def test_best_response(play: Play) -> None:
+    """One episode each of learning, of timing and of what was learned."""
+    said = play(
+        "best_response", "--train", "1", "--runs", "1", "--jobs", "1",
+        "--net", "pedestrians", "--ego", "constant",
+    )  # fmt: skip
+    assert [line.split()[2] for line in said.splitlines()[1:]] == ["timing", "best-response"]
+    assert "could not be played" not in said
+
+
+def test_cav_gym(play: Play) -> None:
+    """One episode a cell, and two of the timing tester."""
+    said = play("cav_gym", "--runs", "1", "--timing-runs", "2")
+    assert len(re.findall(r"^\S+ +[136] .*(?:yes|NO)$", said, re.MULTILINE)) == 12
+
+
+def test_chaos(play: Play) -> None:
+    """One episode, and no time for a kill: the batches are equal."""
+    said = play("chaos", "--runs", "1", "--kills-every", "60", NET=NET)
+    assert said.count("equal: True") == 2
+
+
+def test_collisions(play: Play) -> None:
+    """An episode of one setup."""
+    said = play(
+        "collisions", "--episodes", "1", "--examples",
+        NETWORKS=("pedestrians",), AGENTS=("timing",), EGOS=("constant",), SHOWN=("wide-vehicle",),
+    )  # fmt: skip
+    assert said.startswith("1 episodes; 0 more in which SUMO died")
+
+
+def test_criticality(play: Play, monkeypatch: pytest.MonkeyPatch) -> None:
+    """An episode of each network."""
+    for names in benchmark("criticality").PARTS.values():
+        for name in names:  # so that it is put back afterwards
+            monkeypatch.setattr(criticality_monitor, name, getattr(criticality_monitor, name))
+    said = play("criticality", "--episodes", "1")
+    assert [line.split()[0] for line in said.splitlines()[1:]] == [
+        "crossing",
+        "junction",
+        "pedestrians",
+    ]
+    assert said.count("%") == 6
+
+
+def test_environments(play: Play) -> None:
+    """An episode in every form."""
+    said = play("environments", "--episodes", "1", "--net", NET, ROUNDS=1)
+    assert said.splitlines()[1].endswith("1.00 of play")
+    assert len(said.splitlines()) == 5
+
+
+def test_external_ego(play: Play) -> None:
+    """An episode of each form, the same in all."""
+    said = play("external_ego", "--episodes", "1", "--net", NET)
+    assert said.startswith("1 episodes, ")
+    assert "its exchange with a program that looks at nothing" in said
+
+
+def test_forecasts(play: Play) -> None:
+    """Two starts of each tester."""
+    said = play("forecasts", "--runs", "2", "--timing-runs", "2")
+    assert "right: 2 of 2" in said
+    assert "tests in the first 2 starts" in said
+
+
+def test_games(play: Play) -> None:
+    """A small problem of each sort, without Storm."""
+    said = play("games", "--mdp", "8", "--game", "16", "--rounds", "1", "--no-storm")
+    assert [line.split()[:2] for line in said.splitlines()[1:3]] == [
+        ["MDP", "120"],
+        ["game", "1200"],
+    ]
+
+
+def test_memory(play: Play) -> None:
+    """A hundred stubs and twenty real episodes of half a second."""
+    said = play("memory", "--stubs", "100", "--episodes", "20")
+    assert said.count("stubs: ") >= 2
+    assert said.count("episodes: ") == 3
+
+
+def test_overlaps(play: Play) -> None:
+    """An episode on the straight road, with drawn traffic."""
+    said = play("overlaps", "--net", NET, "--agent", "timing", "--runs", "1")
+    assert said.splitlines()[1].split()[:3] == ["pedestrians", "timing", "1"]
+
+
+def test_pages(play: Play) -> None:
+    """Two seconds of an episode, on one screen."""
+    if CHROMIUM is None:
+        pytest.skip("no chromium here: apt-get install chromium")
+    pytest.importorskip("playwright.sync_api", reason="no playwright: pip install playwright")
+    module = benchmark("pages")
+    settings = module.SETTINGS | {"end": 2.0, "assertions": ["collision"]}
+    screens = {"laptop": module.SCREENS["laptop"]}
+    said = play("pages", "--chromium", CHROMIUM, SETTINGS=settings, SCREENS=screens)
+    assert said.count("between two drawings") == 1
+
+
+def test_playback(play: Play) -> None:
+    """An episode of one batch."""
+    batches = {"straight": {"net": "pedestrians", "agents": ["timing"], "end": 5.0}}
+    with pytest.raises(SystemExit) as ended:
+        play("playback", "--runs", "1", BATCHES=batches)
+    assert not ended.value.code
+
+
+def test_replays(play: Play, capsys: pytest.CaptureFixture[str]) -> None:
+    """Both episodes of one batch."""
+    batches = {"straight": {"net": "pedestrians", "agents": ["timing", "noop"], "end": 5.0}}
+    with pytest.raises(SystemExit) as ended:
+        play("replays", "--replays", "2", "--runs", "1", BATCHES=batches)
+    assert not ended.value.code
+    assert numbers(capsys.readouterr().out.splitlines()[-2]) == [1, 1, 0]
+
+
+def test_shared(play: Play) -> None:
+    """A block of two episodes."""
+    said = play("shared", "--blocks", "1", "--net", NET, SHARED_BY=2)
+    assert "2 episodes" in said.splitlines()[0]
+    assert "tests found" in said.splitlines()[-1]
+
+
+def test_ssm(play: Play) -> None:
+    """It has no size: all encounters."""
+    assert len(play("ssm").splitlines()) > 3
+
+
+def test_throughput(play: Play) -> None:
+    """Two episodes, with cars that wander about."""
+    said = play("throughput", "--episodes", "2", "--cars", "2", "--net", NET)
+    shares = [numbers(line)[-1] for line in said.splitlines() if line.endswith("%")]
+    assert len(shares) == 8
+    assert sum(shares) == pytest.approx(100.0, abs=0.5)
+    assert "contacts and assertions" in said
+
+
+# Experiments --------------------------------------------------------------------------------------
+
+
+def script(name: str) -> ModuleType:
+    """A module of experiments/, which is no package."""
+    spec = importlib.util.spec_from_file_location(name, ROOT / "experiments" / f"{name}.py")
+    assert spec is not None
+    assert spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+STUDY = f"""
+net = "{NET}"
+routes = "none"
+agents = ["programmed-random", "nearest=election"]
+runs = 2
+end = 5
+trace = "none"
+
+[[vary.place]]
+name = "straight"
+ego = "constant"
+
+[vary]
+testers = [1, 3]
+"""
+
+
+@pytest.mark.parametrize(("name", "tables"), [("tables", 4), ("games", 1)])
+def test_the_tables_of_the_experiments(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, name: str, tables: int
+) -> None:
+    """Of a study of four episodes, on a page of its own."""
+    (tmp_path / "study.toml").write_text(STUDY, encoding="utf-8")
+    words = ["run", "-c", "study.toml", "-o", "small.csv", "-q", "--exit-zero"]
+    assert cavsumo(tmp_path, *words).returncode == 0
+    monkeypatch.syspath_prepend(str(ROOT / "experiments"))
+    sys.modules.pop("tables", None)
+    module = script(name)
+    where = sys.modules.get("tables", module)
+    written: dict[str, list[str]] = {}
+    monkeypatch.setattr(
+        module, "write_tables", lambda found: written.update({k: [*v] for k, v in found.items()})
+    )
+    (tmp_path / "peers.csv").write_bytes((ROOT / "experiments" / "peers.csv").read_bytes())
+    monkeypatch.setattr(where, "HERE", tmp_path)
+    files = [str(tmp_path / f"small-straight-testers{n}.csv") for n in (1, 3)]
+    monkeypatch.setattr(sys, "argv", [name, *files])
+    module.main()
+    sys.modules.pop("tables", None)
+    assert len(written) == tables
+    assert len(written["rates" if name == "tables" else "games"]) == 2 + 2 * (1 + (name == "games"))
+    assert (tmp_path / "agency.csv").is_file() == (name == "tables")
