@@ -22,7 +22,8 @@ from cavsumo.results.columns import Row, row_of
 from cavsumo.results.rows import Outcome
 from cavsumo.results.traces import frame, origin, trace_head, trace_text
 from cavsumo.simulation.avoidability import AvoidabilityCheck
-from cavsumo.simulation.loop import Episode, play
+from cavsumo.simulation.checkpoints import begun
+from cavsumo.simulation.loop import Episode, EpisodeLoop, played_on
 from cavsumo.simulation.playback import played_back, recorded
 from cavsumo.simulation.setup import make_setup
 
@@ -64,35 +65,48 @@ class EpisodeRunner:
 
     def play(self, job: Job, beat: Callable[[], None] = lambda: None) -> Answer:
         """Play a job; ``beat`` is called when another simulation begins for it."""
-        begun = time.perf_counter()
-        log = ""
+        since = time.perf_counter()
+        log, checkpoint = "", None
         try:
             agents = self.agents_of(job)
             before = _recall(agents)
             own = job.simulation == "own"
             record = job.record or (self.plan.trace != "none" and own)
             retry = own and self.plan.reference != "none"
+
+            def check(episode: Episode, kept: EpisodeLoop | None = None) -> AvoidabilityCheck:
+                demand = job.recorded.departures if job.recorded else None
+                how = self.setup, agents, job.seed, record, episode, beat, demand, kept
+                return AvoidabilityCheck(*how)
+
             if job.recorded is not None:
                 episode = played_back(self.setup, job.recorded)
             else:
                 how: dict[str, Any] = {"keep": retry, "simulation": job.simulation}
-                episode = play(self.setup, agents, job.seed, record=record, **how)
+                asked, deadline = check if retry else None, self.plan.deadline_s / 2
+                loop, checkpoint = begun(
+                    self.setup, agents, job.seed, asked, deadline, record=record, **how
+                )
+                episode = played_on(loop)
             memory = _recall(agents)
             log = self.setup.ego.take_log()
             avoidability = None
             if retry and episode.outcome == VIOLATED:
-                demand = job.recorded.departures if job.recorded else None
-                retrial = AvoidabilityCheck(
-                    self.setup, agents, job.seed, record, episode, beat, demand
-                )
-                avoidability = retrial.judged(REFERENCES.make(self.plan.reference, {}))
+                reference = REFERENCES.make(self.plan.reference, {})
+                if checkpoint is not None:
+                    beat()
+                    avoidability = checkpoint.judged(episode, reference)
+                avoidability = avoidability or check(episode).judged(reference)
             row = row_of(finished(self.plan, job, episode, avoidability))
             trace = self._trace(job, row, before, episode) if record else ""
         except Exception as error:  # any error costs this row and no other
             said = str(error) if isinstance(error, CavsumoError) else f"defect: {error!r}"
             row, trace = row_of(finished(self.plan, job, error=said)), ""
             memory = job.memory
-        row["wall_s"] = time.perf_counter() - begun
+        finally:
+            if checkpoint is not None:
+                checkpoint.close()
+        row["wall_s"] = time.perf_counter() - since
         said_later = self.setup.ego.take_log()  # of an episode that failed; a rerun's is not kept
         return Answer(Outcome(row, trace, log or said_later), memory)
 

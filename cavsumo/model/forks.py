@@ -13,6 +13,7 @@ import fcntl
 import os
 import pickle
 import random
+import resource
 import selectors
 import signal
 import stat
@@ -20,7 +21,8 @@ import sys
 import threading
 import time
 from collections import deque
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Generator, Iterable
+from functools import cache
 from pathlib import Path
 from typing import Any, Generic, TypeVar
 
@@ -31,6 +33,7 @@ from cavsumo.model.processes import end_with_parent, ending
 Result = TypeVar("Result")
 
 HEAD = 8  # bytes in which a child sends the length of its result
+MEASURED = 3  # forks of which the cost is taken
 CHUNK = 1 << 20  # bytes read at once
 ALARM_AFTER_S = 30.0  # time after its deadline at which a child ends by itself
 
@@ -50,16 +53,21 @@ class Fork(Generic[Result]):
     Args:
         work: called in the child; its result must be picklable.
         deadline: how long it may take [s].
+        keep: a descriptor of this process that the child keeps.
 
     Attributes:
         source: the descriptor from which its result is read.
         ends: when it is due, on the clock of ``time.monotonic`` [s].
     """
 
-    def __init__(self, work: Callable[[], Result], deadline: float) -> None:
+    def __init__(
+        self, work: Callable[[], Result], deadline: float, keep: int | None = None
+    ) -> None:
         self._deadline, self.ends = deadline, time.monotonic() + deadline
         self._received = bytearray()
         places, follow_parent = _places(), end_with_parent(os.getpid())
+        if keep is not None:
+            del places[keep]
         drawn = random.getstate()  # Python seeds it anew in a fork
         _flush()
         self.source, sink = os.pipe()
@@ -98,6 +106,16 @@ class Fork(Generic[Result]):
         result: Result = value
         return result
 
+    def awaited(self, deadline: float) -> Result:
+        """The result as soon as it is there; raises BranchError, also after a deadline [s]."""
+        ends = time.monotonic() + deadline
+        with selectors.DefaultSelector() as selector:
+            selector.register(self.source, selectors.EVENT_READ)
+            while selector.select(max(0.0, ends - time.monotonic())):
+                if self.receive():
+                    return self.result()
+        raise self.overdue()
+
     def overdue(self) -> BranchError:
         """The error of a child that took too long, which is killed."""
         self.kill()
@@ -112,7 +130,8 @@ class Fork(Generic[Result]):
     def kill(self) -> None:
         """Kill the child and what it has started."""
         os.kill(self._pid, signal.SIGSTOP)  # so that it starts no others
-        kill_descendants(self._pid)
+        if _has_children(self._pid):
+            kill_descendants(self._pid)
         os.kill(self._pid, signal.SIGKILL)
         self.end()
 
@@ -123,7 +142,7 @@ class Fork(Generic[Result]):
 
 def forked(
     works: Iterable[Callable[[], Result]], *, at_once: int, deadline: float
-) -> Iterator[Result | BranchError]:
+) -> Generator[Result | BranchError]:
     """The result of each work, or its error, in their order.
 
     Args:
@@ -150,6 +169,21 @@ def result_of(work: Callable[[], Result], deadline: float) -> Result | BranchErr
     """The result of one work, or its error."""
     (found,) = forked([work], at_once=1, deadline=deadline)
     return found
+
+
+@cache
+def cost_of_fork() -> float:
+    """Processor time of a fork that does nothing, of both processes [s]; measured once."""
+    before = _processor_time()
+    for _ in range(MEASURED):
+        result_of(int, ALARM_AFTER_S)
+    return (_processor_time() - before) / MEASURED
+
+
+def _processor_time() -> float:
+    """Processor time of this process and its children that have ended [s]."""
+    uses = map(resource.getrusage, (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN))
+    return sum(use.ru_utime + use.ru_stime for use in uses)
 
 
 class _Running(Generic[Result]):
@@ -261,14 +295,14 @@ def _send(sink: int, data: bytes) -> None:
 def _leave() -> None:
     """End this process, and before it those that it has started."""
     _flush()
-    if _has_children():
+    if _has_children(os.getpid()):
         kill_descendants(os.getpid())
     os._exit(0)
 
 
-def _has_children() -> bool:
-    """Whether this process has children; True where the system does not say."""
+def _has_children(pid: int) -> bool:
+    """Whether a process has children; True where the system does not say."""
     try:
-        return bool(Path(f"/proc/self/task/{os.getpid()}/children").read_bytes())
+        return bool(Path(f"/proc/{pid}/task/{pid}/children").read_bytes())
     except OSError:
         return True

@@ -9,6 +9,9 @@ learns from a rerun.
 
 from __future__ import annotations
 
+import dataclasses
+import math
+import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -21,16 +24,17 @@ from cavsumo.egos.reference import Reference
 from cavsumo.egos.reference.encounter import encounter
 from cavsumo.errors import BranchError, CavsumoError
 from cavsumo.model.departures import Demand
-from cavsumo.model.forks import can_fork, result_of
+from cavsumo.model.forks import can_fork, cost_of_fork, result_of
 from cavsumo.model.scene import Scene
 from cavsumo.model.snapshot import BodyState, Snapshot
 from cavsumo.simulation.avoidability_guess import foreseen
-from cavsumo.simulation.loop import Episode
-from cavsumo.simulation.playback import recorded
+from cavsumo.simulation.loop import Episode, EpisodeLoop
+from cavsumo.simulation.playback import doing, playback, recorded
 from cavsumo.simulation.reruns import Rerun
 from cavsumo.simulation.setup import Setup
 
 MOST_RERUNS = 6  # a search that needs more reports its bounds
+USUAL_RERUNS = 3  # one at the perception, two that confirm a right guess
 STRIDES = (1, 4)  # how far from the last answer the next one is asked for, then halfway [timesteps]
 NOTABLE_MPS = 1.5  # less speed lost avoids little
 FORK_S = 3600.0  # time for a fork, far above that of any episode; the caller's own ends it before
@@ -69,6 +73,7 @@ class AvoidabilityCheck:
         demand: the departures with which it was played; None for the scenario's own demand, which
             goes on where a rerun outlasts the episode.
         beat: called before each rerun, so that a waiting process knows that it continues.
+        kept: the same episode at its start, which the reruns may use up; None to start SUMO again.
     """
 
     setup: Setup
@@ -78,6 +83,7 @@ class AvoidabilityCheck:
     episode: Episode
     beat: Callable[[], None]
     demand: Demand | None = None
+    kept: EpisodeLoop | None = None
 
     @property
     def broken(self) -> Assertion:
@@ -203,33 +209,49 @@ class AvoidabilityCheck:
         self.beat()
         return self._rerun().avoids(reference, step)
 
-    def _rerun(self) -> Rerun:
-        """The episode about to be played again, in this process."""
+    def _rerun(self, kept: EpisodeLoop | None = None) -> Rerun:
+        """The episode about to be played again, in this process.
+
+        Args:
+            kept: the episode at its start, to begin with it in place of a new simulation.
+        """
+        if kept is not None:
+            actions = [list(joint) for joint in self.episode.actions]
+            kept.hand_over(doing(actions, len(self.setup.teams)))
+            return Rerun(kept, self.episode, self.broken)
         # Bodies that the rerun leaves out count with their states of the first episode.
         record = self.record or any(a.sees_background for a in self.setup.assertions)
-        return Rerun(self.setup, self._recorded, self.episode, self.broken, record, self.agents)
+        setup = dataclasses.replace(self.setup, assertions=(self.broken,))
+        loop = playback(setup, self._recorded, record=record, alike=self.agents)
+        return Rerun(loop, self.episode, self.broken)
 
     def _forked(self, first: int) -> Callable[[Reference, int], bool]:
-        """``_avoided`` by forks of one rerun that has come to a timestep, where that is possible.
+        """``_avoided`` by forks of one rerun that has come to a timestep, where that pays.
 
         An earlier takeover, or a fork that fails, is found out by a rerun of its own.
         """
         if self.setup.ego.outside or not can_fork():
             return self._avoided
         self.beat()
-        rerun = self._rerun()
+        begun = time.process_time()
+        rerun = self._rerun(self.kept)
         rerun.advance(first)
-        alone = False  # whether another rerun has taken its simulation
+        spent = math.inf if self.kept else time.process_time() - begun
+        pays = spent > cost_of_fork() * USUAL_RERUNS / (USUAL_RERUNS - 1)
+        alone = False  # whether its simulation is used up, by itself or by another rerun
 
         def avoids(reference: Reference, step: int) -> bool:
             nonlocal alone
-            if not alone and step >= rerun.step:
-                self.beat()
+            if alone or step < rerun.step:
+                alone = True
+                return self._avoided(reference, step)
+            self.beat()
+            if pays:
                 found = result_of(lambda: rerun.avoids(reference, step), FORK_S)
                 if not isinstance(found, BranchError):
                     return found
             alone = True
-            return self._avoided(reference, step)
+            return self._avoided(reference, step) if pays else rerun.avoids(reference, step)
 
         return avoids
 

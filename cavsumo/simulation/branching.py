@@ -14,19 +14,19 @@ from __future__ import annotations
 import copy
 import random
 import time
-from collections.abc import Callable, Iterable, Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
+from contextlib import closing, contextmanager
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from cavsumo.agents.base import Agent
-from cavsumo.agents.recorded import RecordedAgent
 from cavsumo.egos.base import Ego
 from cavsumo.errors import BranchError, CavsumoError, SimulationError
 from cavsumo.model.forks import can_fork, forked
 from cavsumo.simulation.loop import Episode, EpisodeLoop, Joint
+from cavsumo.simulation.playback import doing
 
 DEADLINE_S = 60.0
 AT_ONCE = 2  # children at the same time
@@ -95,9 +95,14 @@ def branches(
         refuse(loop, one)
     if fork and can_fork():
         works = (_work(loop, one) for one in told)
-        yield from forked(works, at_once=at_once, deadline=deadline)
+        found = forked(works, at_once=at_once, deadline=deadline)
     else:
-        yield from _replayed(loop, told, deadline)
+        found = _replayed(loop, told, deadline)
+    with closing(found):
+        for one_found in found:
+            if isinstance(one_found, Episode):  # its places are known by identity
+                one_found.starts, one_found.waited = loop.placed.starts, loop.placed.waited
+            yield one_found
 
 
 def _work(loop: EpisodeLoop, continuation: Continuation) -> Callable[[], Episode]:
@@ -110,9 +115,9 @@ def _played(loop: EpisodeLoop, how: Continuation, ends: float = np.inf) -> Episo
 
     ``ends``: when it is due, on the clock of ``time.monotonic`` [s].
     """
-    agents = how.agents
+    agents: Sequence[Agent] | None = how.agents
     if how.actions is not None:
-        agents = [_doing(how.actions, i) for i in range(len(loop.setup.teams))]
+        agents = doing(how.actions, len(loop.setup.teams))
     try:
         loop.hand_over(agents, how.ego, how.seed, record=how.record)
         last = np.inf if how.steps is None else loop.snapshot.step + how.steps
@@ -131,6 +136,8 @@ def refuse(loop: EpisodeLoop, how: Continuation) -> None:
     setup = loop.setup
     if loop.over:
         raise BranchError("the episode is over: nothing can follow in a branch")
+    if loop.replaced:
+        raise BranchError("another episode has begun in the simulation: nothing is left to branch")
     if setup.ego.outside or (how.ego is not None and how.ego.outside):
         raise BranchError(
             "an ego outside of this process (exec:, tcp:) has one conversation, which a branch "
@@ -146,19 +153,12 @@ def refuse(loop: EpisodeLoop, how: Continuation) -> None:
         raise BranchError("the ego of a branch must have the box and limits of the one it replaces")
 
 
-def _doing(actions: Sequence[Joint], agent: int) -> RecordedAgent:
-    """One that does what the agent of that number is told."""
-    one = RecordedAgent()
-    one.remember({"starts": (), "waited": (), "actions": [joint[agent] for joint in actions]})
-    return one
-
-
 # Without a fork
 
 
 def _replayed(
     loop: EpisodeLoop, continuations: Iterable[Continuation], deadline: float
-) -> Iterator[Episode | BranchError]:
+) -> Generator[Episode | BranchError]:
     """Branches played here, after which the episode's own simulation is brought back."""
     told = loop.setup.world.told
     if not loop.setup.world.repeatable:

@@ -100,6 +100,7 @@ class EpisodeLoop:
     Attributes:
         setup: with which it is played.
         scene: the constant part of the episode.
+        placed: where the testers started.
         snapshot: the true state now.
         history: all states so far.
         ego_view, agent_views: the views of the ego and of each agent.
@@ -121,7 +122,8 @@ class EpisodeLoop:
         self.scene, self._senses, begun, self._generators = _reset(
             setup, agents, seed, record, simulation, demand
         )
-        self.snapshot = begun.snapshot
+        self.placed, self.snapshot = begun, begun.snapshot
+        self._place = setup.world.begun
         self._show(self.snapshot)
         self._rewards = RewardMonitor(self.scene, setup.teams)
         self._episode = Episode(Judgement(""), starts=begun.starts, waited=begun.waited)
@@ -205,6 +207,11 @@ class EpisodeLoop:
         self._keep(record)
 
     @property
+    def replaced(self) -> bool:
+        """Whether another episode has begun in its simulation, so that it cannot continue."""
+        return self.setup.world.begun != self._place
+
+    @property
     def contacts(self) -> ContactMonitor:
         """The contacts so far."""
         return self._episode.contacts
@@ -280,7 +287,13 @@ def play(
     simulation: Simulation = "own",
 ) -> Episode:
     """A whole episode; the arguments are those of ``EpisodeLoop``."""
-    loop = EpisodeLoop(setup, agents, seed, record=record, keep=keep, simulation=simulation)
+    return played_on(
+        EpisodeLoop(setup, agents, seed, record=record, keep=keep, simulation=simulation)
+    )
+
+
+def played_on(loop: EpisodeLoop) -> Episode:
+    """An episode played to its end."""
     while not loop.over:
         loop.step()
     return loop.finished()

@@ -9,11 +9,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from cavsumo.agents.base import Agent
-from cavsumo.agents.recorded import Recorded
+from cavsumo.agents.recorded import Recorded, RecordedAgent
 from cavsumo.model.bodies import Action
 from cavsumo.model.departures import Demand
 from cavsumo.network.recorded_starts import start_record
-from cavsumo.simulation.loop import Episode, EpisodeLoop, Joint
+from cavsumo.simulation.loop import Episode, EpisodeLoop, Joint, played_on
 from cavsumo.simulation.setup import Setup
 
 
@@ -42,6 +42,14 @@ def by_body(setup: Setup, joint: Joint) -> tuple[Action, ...]:
     return tuple(found[body] for body in sorted(found))
 
 
+def doing(actions: Sequence[Joint], teams: int) -> list[RecordedAgent]:
+    """Agents that do what they are told in each timestep, one for each team, and then nothing."""
+    agents = [RecordedAgent() for _ in range(teams)]
+    for i, agent in enumerate(agents):
+        agent.remember({"starts": (), "waited": (), "actions": [joint[i] for joint in actions]})
+    return agents
+
+
 def playback(
     setup: Setup, played: Recorded, *, record: bool = False, alike: Sequence[Agent] = ()
 ) -> EpisodeLoop:
@@ -60,7 +68,4 @@ def playback(
 
 def played_back(setup: Setup, played: Recorded) -> Episode:
     """A recorded episode played again as a whole, every snapshot and action kept."""
-    loop = playback(setup, played, record=True)
-    while not loop.over:
-        loop.step()
-    return loop.finished()
+    return played_on(playback(setup, played, record=True))

@@ -9,8 +9,6 @@ import dataclasses
 import math
 from collections.abc import Sequence
 
-from cavsumo.agents.base import Agent
-from cavsumo.agents.recorded import Recorded
 from cavsumo.assertions.base import VIOLATED, Assertion, Judgement
 from cavsumo.assertions.contacts import STANDING_MPS, Contact
 from cavsumo.egos.reference import Reference
@@ -18,9 +16,7 @@ from cavsumo.egos.reference.takeover import Takeover
 from cavsumo.errors import CavsumoError
 from cavsumo.model.snapshot import Snapshot
 from cavsumo.model.zone_presence import is_vehicle, ran_into
-from cavsumo.simulation.loop import Episode
-from cavsumo.simulation.playback import playback
-from cavsumo.simulation.setup import Setup
+from cavsumo.simulation.loop import Episode, EpisodeLoop
 
 STILL_MPS = 1e-6  # rounding apart, the ego has come to stand
 
@@ -61,27 +57,19 @@ class Rerun:
     """An episode that is played again, with its original ego so far.
 
     Args:
-        setup: in which it was played.
-        recorded: the episode, to be played back.
-        episode: the same with all its snapshots.
+        loop: the episode once more, at its start; it is this rerun's own.
+        episode: what it was, with all its snapshots.
         broken: the assertion that was violated.
-        record: show everybody in the snapshots.
-        agents: that played it.
     """
 
-    def __init__(
-        self,
-        setup: Setup,
-        recorded: Recorded,
-        episode: Episode,
-        broken: Assertion,
-        record: bool,
-        agents: Sequence[Agent],
-    ) -> None:
-        self._episode, self._broken, self._watch = episode, broken, ContactWatch(math.inf)
-        self._ego = Takeover(setup.ego, drives=episode.drives)
-        again = dataclasses.replace(setup, ego=self._ego, assertions=(broken, self._watch))
-        self._loop = playback(again, recorded, record=record, alike=agents)
+    def __init__(self, loop: EpisodeLoop, episode: Episode, broken: Assertion) -> None:
+        self._loop, self._episode, self._broken = loop, episode, broken
+        self._watch = ContactWatch(math.inf)
+        self._watch.reset(loop.scene)
+        self._ego = Takeover(loop.setup.ego, drives=episode.drives)
+        self._ego.begin(loop.scene)
+        assertions = broken, self._watch
+        loop.setup = dataclasses.replace(loop.setup, ego=self._ego, assertions=assertions)
         self._check_same()
 
     @property

@@ -12,7 +12,7 @@ from __future__ import annotations
 import math
 import os
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
@@ -58,6 +58,7 @@ class World:
     Attributes:
         simulations: starts and advances SUMO.
         collisions: pairs that SUMO itself reported as colliding in this episode.
+        begun: how many episodes have begun here.
         teleports, emergency_stops: how many SUMO reported in this episode.
     """
 
@@ -71,6 +72,7 @@ class World:
         self._heard = (folder / "stderr.log").open("ab")
         self.simulations = Simulations(libsumo, scenario, site, ego, folder)
         self._roaming: Roaming | None = None
+        self.begun = 0
         self._calls: list[tuple[str, tuple[Any, ...]]] = []  # what ``again`` does again
         self._mark = object()  # stands for this world in _PLAYING without keeping it alive
         shapely.prepare(site.crossings)
@@ -118,6 +120,7 @@ class World:
         Raises SimulationError with SUMO's message if SUMO refuses, or if the ego finds no room to
         enter.
         """
+        self.begun += 1
         how = everything, simulation, demand, note
         self._calls = [("_begin", (seed, tuple(states), tuple(starts), *how))]
         return self._begin(seed, states, starts, *how)
@@ -255,7 +258,8 @@ class World:
     @contextmanager
     def _listening(self) -> Iterator[None]:
         """Turn SUMO's refusals into SimulationError with the message that it prints on stderr."""
-        self._heard.truncate(0)
+        with suppress(OSError):  # in a fork it leads nowhere
+            self._heard.truncate(0)
         stderr = os.dup(2)
         os.dup2(self._heard.fileno(), 2)
         try:

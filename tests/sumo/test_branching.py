@@ -24,6 +24,7 @@ from cavsumo.model.bodies import NOOP, Action
 from cavsumo.model.snapshot import Snapshot
 from cavsumo.simulation.branching import Continuation, branch, branches
 from cavsumo.simulation.loop import Episode, EpisodeLoop
+from cavsumo.simulation.playback import played_back, recorded
 from cavsumo.sumo import reseeding
 
 Begin = Callable[..., EpisodeLoop]
@@ -115,6 +116,16 @@ def test_without_record_only_the_totals_come_back(begin: Begin) -> None:
         "the last one may be that in which the ego left"
     )
     assert (short.judgement, short.steps) == (long.judgement, long.steps)
+
+
+@pytest.mark.parametrize("fork", [True, False])
+def test_a_branch_is_played_back_like_any_episode(begin: Begin, fork: bool) -> None:
+    """From its record, with the starts among the site's own; so a search can judge its failures."""
+    loop = begin("pedestrians", record=True)
+    found = branch(loop, Continuation([Agent()], record=True), fork=fork)
+    assert found.starts is loop.placed.starts
+    again = played_back(loop.setup, recorded(loop.setup, found, loop.scene.seed, None))
+    assert content(again)["frames"] == content(found)["frames"]
 
 
 def test_routes_that_are_read_piece_by_piece(begin: Begin, tmp_path: Path) -> None:
@@ -246,6 +257,14 @@ def test_an_episode_that_is_over_has_no_branches(begin: Begin) -> None:
     loop = begin("pedestrians")
     to_the_end(loop)
     with pytest.raises(BranchError, match="is over"):
+        branch(loop, Continuation())
+
+
+def test_an_episode_whose_simulation_another_has_is_refused(begin: Begin) -> None:
+    """It would be a branch of the other one."""
+    loop = begin("pedestrians")
+    begin("pedestrians")
+    with pytest.raises(BranchError, match="another episode has begun"):
         branch(loop, Continuation())
 
 

@@ -38,6 +38,10 @@ class Takeover(Ego):
 
     def reset(self, scene: Scene) -> None:
         self._ego.reset(scene)
+        self.begin(scene)
+
+    def begin(self, scene: Scene) -> None:
+        """Begin an episode for which the original has been reset."""
         self._dt = scene.dt
         self._course = Course(scene.ego_path, self.kind, scene.dt, self.kind.v_max)
         self._before: float | None = None  # speed at the timestep before
