@@ -41,7 +41,7 @@ def test_one_command_tests_at_a_real_junction(tmp_path: Path, networks: Mapping[
 
 @pytest.mark.parametrize(
     ("words", "said"),
-    [("cook", "invalid choice"), ("run --agent timming", "did you mean 'timing'?")],
+    [("cook", "unknown command 'cook'"), ("run --agent timming", "did you mean 'timing'?")],
 )
 def test_bad_input_is_one_sentence(tmp_path: Path, words: str, said: str) -> None:
     """On stderr, with exit status 2, and nothing written."""
