@@ -355,7 +355,8 @@ def test_moments_of_a_trace(tmp_path: Path) -> None:
         for i, (x, y) in enumerate(places)
     ]
     head = {"format": "cavsumo-trace-1", "memory": None, "memory_kept": True, "bodies": []}
-    head |= dict.fromkeys(("row", "plan", "sha256", "versions", "sumo_options"), {})
+    head |= {key: {} for key in ("plan", "sha256", "versions", "sumo_options")}
+    head["row"] = {"run": "0", "seed": "1", "agent": "timing", "outcome": "not_triggered"}
     file = tmp_path / "t.jsonl"
     file.write_text(trace_text(head, frames), encoding="utf-8")
     moments = read_moments(file, [0.1, 0.26, 0.0])
