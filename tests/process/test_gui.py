@@ -78,15 +78,14 @@ def test_sumo_is_given_the_route_that_everybody_draws(
 
 
 def test_without_a_display_it_says_so(
-    monkeypatch: pytest.MonkeyPatch, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    monkeypatch: pytest.MonkeyPatch, found_failure: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """Before a trace is read or played."""
+    """Before anything is played."""
     pytest.importorskip("sumo")
     for name in ("DISPLAY", "WAYLAND_DISPLAY"):
         monkeypatch.delenv(name, raising=False)
     monkeypatch.setattr(gui.sys, "platform", "linux")
-    (tmp_path / "no.jsonl").touch()
-    assert main(["replay", str(tmp_path / "no.jsonl"), "--gui"]) == Exit.USAGE
+    assert main(["replay", str(found_failure), "1", "--gui"]) == Exit.USAGE
     assert "there is no display to show it on" in capsys.readouterr().err
 
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import itertools
 import math
-import subprocess
 import sys
 import warnings
 from collections.abc import Callable, Iterator
@@ -16,7 +15,6 @@ import numpy as np
 import pytest
 from gymnasium.error import ResetNeeded
 from gymnasium.utils.env_checker import check_env
-from gymnasium.vector import AsyncVectorEnv
 from support import SHORT, STRAIGHT_NET
 
 from cavsumo.agents import AGENTS
@@ -30,7 +28,7 @@ from cavsumo.envs.discrete import DiscreteActions
 from cavsumo.envs.ego import EgoEnv
 from cavsumo.envs.ego_observations import entries as ego_entries
 from cavsumo.envs.ego_rewards import HARSH_COST, OFF_ROAD, PROGRESS, TIME_COST, VIOLATION
-from cavsumo.errors import AgentError, InputError, SimulationError, SimulationTaken
+from cavsumo.errors import AgentError, InputError, SimulationTaken
 from cavsumo.model.bodies import CAR, PEDESTRIAN
 from cavsumo.model.snapshot import Snapshot
 from cavsumo.results.rows import cell
@@ -91,46 +89,6 @@ def test_the_wrappers_of_make_have_nothing_to_say(name: str, make: Make) -> None
     assert last["episode"]["r"] == pytest.approx(sum(rewards), abs=1e-4)
     assert last["summary"]["steps"] == last["episode"]["l"]
     assert not any("summary" in step[4] for step in steps[:-1])
-
-
-def test_importing_or_naming_the_package_registers_the_environments() -> None:
-    """In a fresh Python: by import, and by ``module:id`` alone."""
-    code = (
-        "import gymnasium, sys\n"
-        f"env = gymnasium.make('cavsumo.envs:cavsumo/Tester-v0', **{SHORT!r})\n"
-        "env.reset(seed=1); env.close()\n"
-        "import importlib; importlib.reload(sys.modules['cavsumo.envs'])\n"
-        "print([name for name in gymnasium.registry if 'cavsumo' in name])\n"
-    )
-    done = subprocess.run(
-        [sys.executable, "-W", "error::UserWarning", "-c", code],
-        capture_output=True,
-        text=True,
-        timeout=120,
-    )
-    assert done.stdout.strip() == str(list(IDS)), done.stderr
-
-
-@pytest.mark.parametrize("method", ["fork", "spawn"])
-def test_environments_play_side_by_side_in_processes(method: str, make: Make) -> None:
-    """One simulation a process: same seeds give the same bits, here and there, others do not."""
-    single = make()
-    first, _ = single.reset(seed=3)  # a child that is forked now must not harm this one
-    action = np.full(6, 0.5, dtype=np.float32)
-    second = single.step(action)[0]
-    makers = [lambda: gymnasium.make("cavsumo.envs:cavsumo/Tester-v0", **SHORT)] * 2
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", DeprecationWarning)  # newer Pythons warn of fork itself
-        vector = AsyncVectorEnv(makers, context=method)
-    try:
-        shown, info = vector.reset(seed=[3, 4])
-        assert np.array_equal(shown[0], first)
-        assert not np.array_equal(shown[0], shown[1])
-        assert info["seed"].tolist() == [3, 4]
-        assert np.array_equal(vector.step(np.stack([action, action]))[0][0], second)
-    finally:
-        vector.close()
-    single.step(action)
 
 
 # The same episodes as a batch
@@ -257,28 +215,6 @@ def test_a_world_beside_an_environment_takes_the_simulation_too(
     with pytest.raises(SimulationTaken):
         env.step(np.zeros(6, dtype=np.float32))
     env.reset(seed=1)
-
-
-def test_processes_of_their_own_keep_environments_apart(make: Make) -> None:
-    """Stepped in turns both show what one alone shows; a crash ends an episode, not the program."""
-    here, one, other = make(), make(process="own"), make(process="own")
-    action = np.full(6, 0.25, dtype=np.float32)
-    here.reset(seed=2)
-    alone = [here.step(action) for _ in range(3)]
-    one.reset(seed=2)
-    other.reset(seed=3)
-    for step in alone:
-        shown, reward, *_ = one.step(action)
-        assert np.array_equal(shown, step[0])
-        assert reward == step[1]
-        assert not np.array_equal(other.step(action)[0], step[0])
-    with pytest.raises(AgentError, match="finite"):
-        one.step(np.full(6, math.nan))
-    one.unwrapped._play.episodes._child._process.kill()
-    with pytest.raises(SimulationError, match="died of signal 9; reset starts another"):
-        one.step(action)
-    one.reset(seed=2)
-    assert np.array_equal(one.step(action)[0], alone[0][0])
 
 
 def test_an_environment_that_nobody_closed_closes_itself() -> None:

@@ -184,7 +184,7 @@ def test_another_program_is_noticed(open_world: Opener, tmp_path: Path) -> None:
     ("words", "said"),
     [
         (["crossing", "--signal", "green"], "signal green: the ego's route has no traffic light"),
-        (["junction", "--signal", "blue"], "signal: unknown value 'blue'; valid: any, green, red"),
+        (["junction", "--signal", "blue"], "unknown value 'blue'; valid: any, green, red"),
     ],
 )
 def test_bad_signals_are_one_sentence(

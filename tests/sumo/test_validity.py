@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import math
+import pathlib
 from collections.abc import Callable
-from types import SimpleNamespace
 from typing import Any
 
 import pytest
+from report_files import write
 from shapely.geometry import LineString, box
 from staging import Stage
 
@@ -25,7 +26,7 @@ from cavsumo.model.scenario import BatchPlan
 from cavsumo.model.scene import Scene
 from cavsumo.model.snapshot import BodyState, Snapshot
 from cavsumo.network.site import Site
-from cavsumo.report.rates import rates
+from cavsumo.report.analysis import analyse
 from cavsumo.results.columns import measured
 from cavsumo.simulation.rewards import GOAL, RewardMonitor
 
@@ -251,27 +252,18 @@ def test_conduct_in_figures() -> None:
     assert naturalness.rms_acceleration(2, DT) == pytest.approx(math.sqrt(1.0 / 4))
 
 
-def test_invalid_episodes_are_counted_apart() -> None:
+def test_invalid_episodes_are_counted_apart(tmp_path: pathlib.Path) -> None:
     """They are in no rate."""
     tally = Tally()
     row = {"agent": "a", "run": 0, "trigger_time_s": "1.0", "violation_time_s": "", "breach": "x"}
-    row["time_s"] = "2.0"
+    row |= {"time_s": "9.0"}
     for outcome in ("held", "not_triggered", "invalid", "invalid"):
         tally.add(row | {"outcome": outcome})
     found = tally.all
     assert (found.invalid, found.valid, found.rate("tests").value) == (2, 2, 0.5)
-    import pandas
-
-    cells = {"outcome": ["held", "invalid"], "avoidable": math.nan, "reference": "", "blame": ""}
-    cells |= {"agent": "a", "run": 0, "time_s": 1.0, "trigger_time_s": 0.5}
-    group: Any = SimpleNamespace(
-        rows=pandas.DataFrame(cells),
-        sequential=False,
-        whose=("", "a", ""),
-        reference="",
-    )
-    shares = rates(group)
-    assert (shares.invalid, shares.tests.total) == (1, 1)
+    alone, invalid = analyse([write(tmp_path / "r.csv", [("held", "invalid")])]).rates
+    assert (alone.invalid, alone.tests.total) == (0, 1)
+    assert (invalid.invalid, invalid.tests.total) == (1, 0)
 
 
 @pytest.fixture(scope="module")

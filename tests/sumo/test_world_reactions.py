@@ -107,7 +107,8 @@ def test_persons_on_a_real_junction_do_not_crash_sumo(set_up: Callable[..., Any]
     prepared = set_up("crossing", embodiment="person", agents=["programmed-random"], runs=3)
     with Worker(prepared) as worker:
         rows = [worker.play(job(prepared.plan, run)).outcome.row for run in prepared.plan.todo()]
-    assert [row["error"] for row in rows] == [""] * 3
+    assert len(rows) == 3
+    assert not any(row["error"] for row in rows)
     assert sum(row["steps"] for row in rows) > 150
 
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import ast
 import re
-import subprocess
 import sys
 import tomllib
 from collections import defaultdict
@@ -39,9 +38,6 @@ ROOMS = {
     }.items()
 }
 ROOT = {"__init__", "__main__", "errors"}
-
-HEAVY = {"numpy", "pandas", "scipy", "shapely", "libsumo", "sumolib", "pydantic", "rich"}
-HEAVY |= {"matplotlib", "osmium", "pyproj", "sumo", "jinja2", "traci"}
 
 OPTIONAL = {"IPython", "PIL", "dask", "distributed", "numba", "osmium", "pettingzoo", "pytest"}
 OPTIONAL |= {"traci"}  # libsumo brings it
@@ -109,15 +105,6 @@ def cycles(graph: Mapping[str, Iterable[str]]) -> list[list[str]]:
         if node not in number:
             visit(node)
     return [component for component in found if len(component) > 1]
-
-
-def loaded_by(module: str) -> set[str]:
-    """The packages that a fresh Python has loaded after importing modules."""
-    code = f"import sys, {module}; print(*{{name.split('.')[0] for name in sys.modules}})"
-    done = subprocess.run(
-        [sys.executable, "-c", code], capture_output=True, text=True, check=True, timeout=120
-    )
-    return set(done.stdout.split())
 
 
 def test_what_is_imported_is_required_or_has_an_extra() -> None:
@@ -218,18 +205,3 @@ def test_sentences_name_their_subject() -> None:
         if word.search(line)
     ]
     assert found == []
-
-
-def test_the_command_line_starts_light() -> None:
-    """Help and mistakes are answered at once: nothing heavy is loaded before a command runs."""
-    assert not HEAVY & loaded_by("cavsumo.cli")
-
-
-def test_the_process_that_waits_has_no_sumo() -> None:
-    """SUMO may take its process down, so the parent, which keeps the results, never loads it."""
-    assert "libsumo" not in loaded_by("cavsumo.batch.playing, cavsumo.cli.commands.run")
-
-
-def test_an_ego_is_checked_without_pytest() -> None:
-    """Who installs cavsumo alone has the command too."""
-    assert "pytest" not in loaded_by("cavsumo.cli.commands.check_ego")

@@ -12,18 +12,16 @@ from typing import Any
 
 import numpy as np
 import pytest
-from support import ROOT, rows
+from support import ROOT
 
 from cavsumo.agents import Agent, Scene
 from cavsumo.agents.observations import VERSION, entries
 from cavsumo.agents.policy import PolicyAgent, effort, make_agent, parameters_of
 from cavsumo.agents.policy_file import Header, Observed, TrainedPolicy, read_policy, write_policy
-from cavsumo.cli import main
 from cavsumo.cli.listings import listing
 from cavsumo.errors import InputError, UnknownName
 from cavsumo.model.bodies import BUS, PEDESTRIAN
 from cavsumo.model.snapshot import Snapshot
-from cavsumo.results.reading import read_manifest
 from cavsumo.testing import AgentContract
 
 NAMES = tuple(name for name, _, _ in entries(1, 1.4, 1.0))
@@ -275,37 +273,3 @@ def test_a_policy_is_listed(kept: Path) -> None:
     assert parameters_of(f"policy:{kept}") == []
     with pytest.raises(UnknownName, match="unknown parameter 'hold'"):
         make_agent(f"policy:{kept}", {"hold": 3})
-
-
-def test_policies_play_beside_registered_agents(
-    networks: dict[str, Path], kept: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """Two policies and timing, relative paths: the rows do not depend on the number of processes.
-
-    The file's checksum is in the manifest; a replay is the same; a resume notices a file that has
-    changed, and a replay takes the copy that was kept.
-    """
-    monkeypatch.chdir(tmp_path)
-    Path("across.npz").write_bytes(kept.read_bytes())
-    write_policy(Path("idle.npz"), constant(1.0, 0.0, 0.0, 0.0, 0.0, actions="targets"))
-    settings = tmp_path / "scenarios"
-    settings.mkdir()
-    (settings / "both.toml").write_text(
-        f'net = "{networks["pedestrians"]}"\nroutes = "none"\nruns = 2\nend = 12.0\n'
-        'agents = ["policy:../across.npz", "timing", "policy:../idle.npz"]\n'
-    )
-    names = ("policy:scenarios/../across.npz", "timing", "policy:scenarios/../idle.npz")
-    words = ["-c", "scenarios/both.toml", "-q", "--exit-zero", "--trace", "all"]
-    assert main(["run", *words, "-o", "one.csv"]) == 0
-    assert main(["run", *words, "-o", "two.csv", "-j", "2"]) == 0
-    one, two = rows(Path("one.csv")), rows(Path("two.csv"))
-    assert [{**r, "trace": ""} for r in one] == [{**r, "trace": ""} for r in two]
-    assert [row["agent"] for row in one] == list(names) * 2
-    cost = {name: sum(float(r["cost"]) for r in one if r["agent"] == name) for name in names}
-    assert cost[names[0]] > 0.0 == cost[names[2]], "who walks across is on the road, who stands not"
-    sums = read_manifest(Path("one.csv"))["sha256"]
-    assert "scenarios/../across.npz" in sums
-    assert main(["replay", "one.csv", "0"]) == 0
-    write_policy(Path("across.npz"), constant(1.0, 0.0, 0.0, 0.0, 0.0, actions="targets"))
-    assert main(["run", "--resume", "-o", "one.csv", "--runs", "3", "-q"]) == 2
-    assert main(["replay", "one.csv", "0"]) == 0

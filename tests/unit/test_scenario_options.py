@@ -12,7 +12,6 @@ import numpy as np
 import pytest
 from shapely.geometry import LineString, Point
 
-from cavsumo import cli
 from cavsumo.errors import InputError, NetworkError, UnknownName
 from cavsumo.model.bodies import BICYCLE, PEDESTRIAN, Kind
 from cavsumo.model.scenario import BatchPlan
@@ -20,7 +19,6 @@ from cavsumo.network.ego_routes import TURNS
 from cavsumo.network.jaywalk_starts import STRIP_M
 from cavsumo.network.pedestrian_starts import draw_starts
 from cavsumo.network.site import Site
-from cavsumo.results.reading import read_rows
 
 Staged = Callable[..., tuple[BatchPlan, Site]]
 # Which way a path turns between its ends [degrees].
@@ -141,18 +139,6 @@ def test_networks_without_pavements_need_jaywalkers(
         staged(net=bare(name))
     areas = staged(net=bare(name), jaywalk=True)[1].areas
     assert sum(area.end - area.begin for area in areas) > 50.0
-
-
-def test_jaywalkers_find_failures_where_there_is_no_pavement(
-    bare: Callable[[str], Path], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """The timing agent triggers tests from beside the road, with background traffic."""
-    monkeypatch.chdir(tmp_path)
-    words = ["--net", str(bare("pedestrians")), "--jaywalk", "--traffic", "3", "--runs", "8", "-q"]
-    assert cli.main(["run", *words, "--exit-zero", "--trace", "none"]) == 0
-    rows = read_rows(tmp_path / "results.csv")
-    assert not any(row["error"] for row in rows)
-    assert sum(row["outcome"] in ("held", "violated") for row in rows) >= 2
 
 
 @pytest.mark.parametrize(
