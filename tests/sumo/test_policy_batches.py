@@ -64,4 +64,4 @@ def test_policies_play_beside_registered_agents(
     assert main(["replay", "one.csv", "0"]) == 0
     write_policy(Path("across.npz"), constant(1.0, 0.0, 0.0, 0.0, 0.0, actions="targets"))
     assert main(["run", "--resume", "-o", "one.csv", "--runs", "3", "-q"]) == 2
-    assert main(["replay", "one.csv", "0"]) == 1
+    assert main(["replay", "one.csv", "0"]) == 0
