@@ -21,7 +21,7 @@ from cavsumo.simulation.avoidability import Avoidability, AvoidabilityCheck
 from cavsumo.simulation.loop import Episode, EpisodeLoop
 from cavsumo.simulation.setup import Setup
 
-QUICK_S = 0.05  # a start that takes less costs no twenty forks, whatever a fork costs
+QUICK_S = 0.05  # a start that takes less takes less than twenty forks
 WORTH = 20.0  # a start that costs as many forks: it pays if one episode in twenty fails
 
 
