@@ -56,8 +56,6 @@ def _compared(
 
 
 def _as_recorded(record: Record, there: Record) -> Record:
-    """A record with the present paths of the network and additional files of another one."""
-    was, scenario = record.plan.scenario, there.plan.scenario
-    places = {str(file): scenario.present(file) for file in was.additional}
-    placed = was.placed(places | {str(was.net): scenario.net_file})
-    return dataclasses.replace(record, plan=record.plan.model_copy(update={"scenario": placed}))
+    """A record with the present paths of another one's files."""
+    scenario = record.plan.scenario.placed(there.plan.scenario.places)
+    return dataclasses.replace(record, plan=record.plan.model_copy(update={"scenario": scenario}))

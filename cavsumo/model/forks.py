@@ -8,34 +8,39 @@ belongs to this process, and Linux kills it when this process dies.
 
 from __future__ import annotations
 
-import contextlib
-import fcntl
 import os
 import pickle
 import random
 import resource
 import selectors
 import signal
-import stat
 import sys
 import threading
 import time
 from collections import deque
 from collections.abc import Callable, Generator, Iterable
 from functools import cache
-from pathlib import Path
 from typing import Any, Generic, TypeVar
 
-from cavsumo.errors import BranchError, CavsumoError
+from cavsumo.errors import BranchError
+from cavsumo.model.fork_child import (
+    ALARM_AFTER_S,
+    HEAD,
+    flush,
+    has_children,
+    leave,
+    outcome,
+    places,
+    send,
+    stand_alone,
+)
 from cavsumo.model.offspring import kill_descendants
 from cavsumo.model.processes import end_with_parent, ending
 
 Result = TypeVar("Result")
 
-HEAD = 8  # bytes in which a child sends the length of its result
 MEASURED = 3  # forks of which the cost is taken
 CHUNK = 1 << 20  # bytes read at once
-ALARM_AFTER_S = 30.0  # time after its deadline at which a child ends by itself
 
 
 def can_fork() -> bool:
@@ -65,11 +70,11 @@ class Fork(Generic[Result]):
     ) -> None:
         self._deadline, self.ends = deadline, time.monotonic() + deadline
         self._received = bytearray()
-        places, follow_parent = _places(), end_with_parent(os.getpid())
+        open_now, follow_parent = places(), end_with_parent(os.getpid())
         if keep is not None:
-            del places[keep]
+            del open_now[keep]
         drawn = random.getstate()  # Python seeds it anew in a fork
-        _flush()
+        flush()
         self.source, sink = os.pipe()
         try:
             self._pid = os.fork()
@@ -80,10 +85,10 @@ class Fork(Generic[Result]):
         if self._pid == 0:
             try:
                 follow_parent()
-                _stand_alone(places, deadline)
+                stand_alone(open_now, deadline)
                 random.setstate(drawn)
-                _send(sink, _outcome(work))
-                _leave()
+                send(sink, outcome(work))
+                leave()
             finally:
                 os._exit(1)
         os.close(sink)
@@ -130,7 +135,7 @@ class Fork(Generic[Result]):
     def kill(self) -> None:
         """Kill the child and what it has started."""
         os.kill(self._pid, signal.SIGSTOP)  # so that it starts no others
-        if _has_children(self._pid):
+        if has_children(self._pid):
             kill_descendants(self._pid)
         os.kill(self._pid, signal.SIGKILL)
         self.end()
@@ -231,78 +236,3 @@ def _wait(selector: selectors.BaseSelector, running: Iterable[_Running[Any]]) ->
         key.data.read()
     for one in running:
         one.check()
-
-
-# In the child, and what it needs from its parent
-
-
-def _flush() -> None:
-    """Write out what is buffered, or both processes would write it."""
-    for stream in (sys.stdout, sys.stderr):
-        if stream is not None:
-            with contextlib.suppress(OSError, ValueError):
-                stream.flush()
-
-
-def _places() -> dict[int, int | None]:
-    """The open descriptors but stdout and stderr; those of files being read with their places."""
-    found: dict[int, int | None] = {}
-    for entry in Path("/proc/self/fd").iterdir():
-        number = int(entry.name)
-        if number in (1, 2):
-            continue
-        with contextlib.suppress(OSError):  # that of the listing itself
-            reads = fcntl.fcntl(number, fcntl.F_GETFL) & os.O_ACCMODE == os.O_RDONLY
-            is_file = stat.S_ISREG(os.fstat(number).st_mode)
-            found[number] = os.lseek(number, 0, os.SEEK_CUR) if reads and is_file else None
-    return found
-
-
-def _stand_alone(places: dict[int, int | None], deadline: float) -> None:
-    """Share no descriptor and no signal handler with the parent."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # the parent decides what Ctrl-C means
-    signal.signal(signal.SIGALRM, signal.SIG_DFL)
-    signal.signal(signal.SIGTERM, signal.SIG_DFL)
-    signal.setitimer(signal.ITIMER_REAL, deadline + ALARM_AFTER_S)
-    nowhere = os.open(os.devnull, os.O_RDWR)
-    for number, place in places.items():
-        if place is None:
-            os.dup2(nowhere, number, inheritable=False)
-            continue
-        again = os.open(f"/proc/self/fd/{number}", os.O_RDONLY)
-        os.lseek(again, place, os.SEEK_SET)
-        os.dup2(again, number, inheritable=False)
-        os.close(again)
-
-
-def _outcome(work: Callable[[], Any]) -> bytes:
-    """Whether a work succeeded, and its result or a sentence, pickled."""
-    try:
-        return pickle.dumps((True, work()), pickle.HIGHEST_PROTOCOL)
-    except CavsumoError as error:
-        return pickle.dumps((False, str(error)))
-    except Exception as error:
-        return pickle.dumps((False, f"defect: {error!r}"))
-
-
-def _send(sink: int, data: bytes) -> None:
-    """Send all of a result, its length first."""
-    left = memoryview(len(data).to_bytes(HEAD, "little") + data)
-    while left:
-        left = left[os.write(sink, left) :]
-
-
-def _leave() -> None:
-    """End this process, and before it those that it has started."""
-    _flush()
-    if _has_children(os.getpid()):
-        kill_descendants(os.getpid())
-    os._exit(0)
-
-
-def _has_children(pid: int) -> bool:
-    """Whether a process has children; True where the system does not say."""
-    try:
-        return bool(Path(f"/proc/{pid}/task/{pid}/children").read_bytes())
-    except OSError:
-        return True

@@ -21,6 +21,7 @@ from cavsumo.simulation.avoidability import Avoidability, AvoidabilityCheck
 from cavsumo.simulation.loop import Episode, EpisodeLoop
 from cavsumo.simulation.setup import Setup
 
+QUICK_S = 0.05  # a start that takes less takes less than twenty forks
 WORTH = 20.0  # a start that costs as many forks: it pays if one episode in twenty fails
 
 
@@ -100,6 +101,8 @@ def begun(
     before = time.process_time()
     loop = EpisodeLoop(setup, agents, seed, **how)
     spent = time.process_time() - before
-    if check is None or setup.ego.outside or not can_fork() or spent < WORTH * cost_of_fork():
+    if check is None or setup.ego.outside or not can_fork():
+        return loop, None
+    if spent < QUICK_S or spent < WORTH * cost_of_fork():
         return loop, None
     return loop, Checkpoint(loop, check, deadline)

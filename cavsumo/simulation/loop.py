@@ -10,10 +10,8 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
-import numpy as np
-
 from cavsumo.agents.base import Agent, Forecast
-from cavsumo.assertions.base import INVALID, VIOLATED, Assertion, Judgement, weightiest
+from cavsumo.assertions.base import INVALID, VIOLATED, Judgement, weightiest
 from cavsumo.assertions.blame import blamed
 from cavsumo.assertions.contacts import ContactMonitor
 from cavsumo.assertions.criticality_monitor import CriticalityMonitor, Extremes
@@ -27,13 +25,11 @@ from cavsumo.model.departures import Demand
 from cavsumo.model.kinematics import step_floats
 from cavsumo.model.scenario import Simulation
 from cavsumo.model.scene import Scene
-from cavsumo.model.seeds import starts_generator
-from cavsumo.model.sensors import Senses
 from cavsumo.model.snapshot import BodyState, Snapshot
 from cavsumo.simulation.ego_progress import EgoProgress, ego_progress
-from cavsumo.simulation.placing import Placed, placed
 from cavsumo.simulation.rewards import Feedback, RewardMonitor
 from cavsumo.simulation.setup import Setup
+from cavsumo.simulation.starting import cast, generators_of, started
 
 # An episode whose verdict is open at the horizon may run on for this long [s].
 OVERTIME_S = 15.0
@@ -119,7 +115,7 @@ class EpisodeLoop:
         demand: Demand | None = None,
     ) -> None:
         self.setup, self._agents = setup, agents
-        self.scene, self._senses, begun, self._generators = _reset(
+        self.scene, self._senses, begun, self._generators = started(
             setup, agents, seed, record, simulation, demand
         )
         self.placed, self.snapshot = begun, begun.snapshot
@@ -188,7 +184,7 @@ class EpisodeLoop:
         """
         setup, scene = self.setup, self.scene
         everybody = record or any(who.sees_background for who in (ego, *(agents or ())) if who)
-        fresh = self._generators if seed is None else _generators(setup, seed)
+        fresh = self._generators if seed is None else generators_of(setup, seed)
         for own, other in zip(self._generators, fresh, strict=True):
             own.bit_generator.state = other.bit_generator.state
         if seed is not None:
@@ -196,7 +192,7 @@ class EpisodeLoop:
             scene = dataclasses.replace(scene, seed=seed)
         if agents is not None:
             self._agents, self._learners = agents, _learn(agents)
-            _cast(setup, agents, scene, self._generators)
+            cast(setup, agents, scene, self._generators)
         if ego is not None:
             ego.prepare(setup.mission)
             ego.reset(scene)
@@ -299,63 +295,6 @@ def played_on(loop: EpisodeLoop) -> Episode:
     return loop.finished()
 
 
-def _reset(
-    setup: Setup,
-    agents: Sequence[Agent],
-    seed: int,
-    record: bool,
-    simulation: Simulation,
-    demand: Demand | None,
-) -> tuple[Scene, Senses | None, Placed, list[np.random.Generator]]:
-    """Place the testers and begin an episode; one generator for each who draws."""
-    generators = _generators(setup, seed)
-    scenario = setup.scenario
-    placing = starts_generator(seed if scenario.starts_seed is None else scenario.starts_seed)
-    watching: list[Ego | Agent | Assertion] = [setup.ego, *agents, *setup.assertions]
-    # Vehicles keep their distance to all bodies ahead of them, so they see everybody.
-    sensors = bool(scenario.ego_sensor or scenario.tester_sensor)
-    everything = record or bool(setup.site.approaches) or sensors
-    everything = everything or any(who.sees_background for who in watching)
-
-    def reset(states: Sequence[BodyState], starts: Sequence[Start]) -> Snapshot:
-        shown = {"everything": everything, "note": record}
-        return setup.world.reset(
-            seed, states, starts, simulation=simulation, demand=demand, **shown
-        )
-
-    begun = placed(setup, agents, placing, reset)
-    ego = setup.world.ego_body
-    scene = setup.site.scene(setup.world.dt, ego, setup.bodies, begun.starts, seed)
-    scene = dataclasses.replace(scene, horizon=scenario.end)
-    senses = _senses(setup, scene, generators[1 + len(agents) :])
-    _cast(setup, agents, scene, generators)
-    setup.ego.reset(scene)
-    for assertion in setup.assertions:
-        assertion.reset(scene)
-    return scene, senses, begun, generators
-
-
-def _generators(setup: Setup, seed: int) -> list[np.random.Generator]:
-    """The generators of an episode: for coordination, each agent, the ego's and agents' sensors.
-
-    Those of sensors come after all others, which are the same with sensors and without. The first
-    stream is that of the starts (``starts_generator``).
-    """
-    streams, teams = np.random.SeedSequence(seed), len(setup.teams)
-    _, *seeds = streams.spawn(2 + teams)
-    return [np.random.default_rng(s) for s in (*seeds, *streams.spawn(1 + teams))]
-
-
-def _cast(
-    setup: Setup, agents: Sequence[Agent], scene: Scene, generators: Sequence[np.random.Generator]
-) -> None:
-    """Have the agents begin, each with its team and generator, and know each other."""
-    electing, *rest = generators[: 1 + len(setup.teams)]
-    for agent, team, rng in zip(agents, setup.teams, rest, strict=True):
-        agent.reset(scene, team, rng)
-    type(agents[0]).coordinate(agents, electing)
-
-
 def _learn(agents: Sequence[Agent]) -> bool:
     """Whether any agent learns from feedback."""
     return any(type(a).process_feedback is not Agent.process_feedback for a in agents)
@@ -365,14 +304,6 @@ def _foretold(agents: Sequence[Agent], views: Sequence[Snapshot]) -> Forecast | 
     """The agents' forecast of the episode: the best of theirs."""
     said = [agent.forecast(view) for agent, view in zip(agents, views, strict=True)]
     return max((one for one in said if one is not None), default=None, key=Forecast.rank)
-
-
-def _senses(setup: Setup, scene: Scene, generators: Sequence[np.random.Generator]) -> Senses | None:
-    """The observers of an episode, None with full observability."""
-    ego, testers = setup.scenario.ego_sensor, setup.scenario.tester_sensor
-    if not (ego or testers):
-        return None
-    return Senses(scene, ego, testers, setup.teams, generators)
 
 
 def _moved(

@@ -88,6 +88,20 @@ def test_best_response(play: Play) -> None:
     assert "could not be played" not in said
 
 
+def test_branching(play: Play, capsys: pytest.CaptureFixture[str]) -> None:
+    """A few branches by both ways, one prefix, what is left of two, the verdicts of an episode."""
+    words = "--net pedestrians --branches 5 --costs 1 --many 2 --failures 1".split()
+    with pytest.raises(SystemExit) as ended:
+        play("branching", *words, PREFIXES=(5,))
+    said = capsys.readouterr().out
+    assert ended.value.code == 0, said
+    assert said.count("5 of 5 branches the same (0 errors), 1 of 1 episodes") == 2
+    assert "by fork" in said
+    before, after = said.split("resources")[1].splitlines()[0].split(": ")[1].split("; ")
+    assert before.rpartition(",")[0] == after.rpartition(",")[0]
+    assert "verdicts the same" in said
+
+
 def test_cav_gym(play: Play) -> None:
     """One episode a cell, and two of the timing tester."""
     said = play("cav_gym", "--runs", "1", "--timing-runs", "2")

@@ -44,6 +44,7 @@ def with_forks(patch: Patch, *, at_start: bool) -> None:
     for module in (avoidability, checkpoints):
         patch.setattr(module, "can_fork", lambda: True)
         patch.setattr(module, "cost_of_fork", lambda: 0.0)
+    patch.setattr(checkpoints, "QUICK_S", 0.0)
     if not at_start:
         patch.setattr(checkpoints, "cost_of_fork", lambda: math.inf)
 
@@ -107,7 +108,7 @@ def test_forks_that_fail_are_replaced_by_reruns(set_up: SetUp, monkeypatch: Patc
         monkeypatch.setattr(checkpoints, "can_fork", lambda: False)
         replayed, _ = outcomes(runner, 2)
         with_forks(monkeypatch, at_start=True)
-        monkeypatch.setattr(forks, "_outcome", lambda work: os._exit(3))
+        monkeypatch.setattr(forks, "outcome", lambda work: os._exit(3))
         assert outcomes(runner, 2)[0] == replayed
 
 

@@ -202,6 +202,11 @@ class Scenario(BaseModel):
         again._places = {**self._places, **places}
         return again
 
+    @property
+    def places(self) -> Mapping[str, Path]:
+        """The present paths of files that have moved, by their names."""
+        return self._places
+
     def present(self, file: Path) -> Path:
         """The present path of a file that the scenario or an agent names."""
         return self._places.get(str(file), file)
