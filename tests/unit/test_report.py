@@ -357,7 +357,13 @@ def test_moments_of_a_trace(tmp_path: Path) -> None:
     ]
     head = {"format": "cavsumo-trace-1", "memory": None, "memory_kept": True, "bodies": []}
     head |= {key: {} for key in ("plan", "sha256", "versions", "sumo_options")}
-    head["row"] = {"run": "0", "seed": "1", "agent": "timing", "outcome": "not_triggered"}
+    head["row"] = {
+        "run": "0",
+        "seed": "1",
+        "agent": "timing",
+        "outcome": "not_triggered",
+        "time_s": "0.2",
+    }
     file = tmp_path / "t.jsonl"
     file.write_text(trace_text(head, frames), encoding="utf-8")
     moments = read_moments(file, [0.1, 0.26, 0.0])
