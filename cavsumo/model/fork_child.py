@@ -51,13 +51,14 @@ def stand_alone(places: Mapping[int, int | None], deadline: float) -> None:
     signal.setitimer(signal.ITIMER_REAL, deadline + ALARM_AFTER_S)
     nowhere = os.open(os.devnull, os.O_RDWR)
     for number, place in places.items():
-        if place is None:
-            os.dup2(nowhere, number, inheritable=False)
+        own = nowhere if place is None else _opened_again(number)
+        if own == number:  # it has been closed since it was listed
             continue
-        again = _opened_again(number)
-        os.lseek(again, place, os.SEEK_SET)
-        os.dup2(again, number, inheritable=False)
-        os.close(again)
+        if place is not None:
+            os.lseek(own, place, os.SEEK_SET)
+        os.dup2(own, number, inheritable=False)
+        if place is not None:
+            os.close(own)
 
 
 def _opened_again(number: int) -> int:
