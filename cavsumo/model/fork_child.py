@@ -9,13 +9,14 @@ import pickle
 import signal
 import stat
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
 from cavsumo.errors import CavsumoError
 from cavsumo.model.offspring import kill_descendants
 
+CHUNK = 1 << 20  # bytes read at once
 HEAD = 8  # bytes in which a child sends the length of its result
 ALARM_AFTER_S = 30.0  # time after its deadline at which a child ends by itself
 
@@ -42,7 +43,7 @@ def places() -> dict[int, int | None]:
     return found
 
 
-def stand_alone(places: dict[int, int | None], deadline: float) -> None:
+def stand_alone(places: Mapping[int, int | None], deadline: float) -> None:
     """Share no descriptor and no signal handler with the parent."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # the parent decides what Ctrl-C means
     signal.signal(signal.SIGALRM, signal.SIG_DFL)
@@ -50,13 +51,25 @@ def stand_alone(places: dict[int, int | None], deadline: float) -> None:
     signal.setitimer(signal.ITIMER_REAL, deadline + ALARM_AFTER_S)
     nowhere = os.open(os.devnull, os.O_RDWR)
     for number, place in places.items():
-        if place is None:
-            os.dup2(nowhere, number, inheritable=False)
+        own = nowhere if place is None else _opened_again(number)
+        if own == number:  # it has been closed since it was listed
             continue
-        again = os.open(f"/proc/self/fd/{number}", os.O_RDONLY)
-        os.lseek(again, place, os.SEEK_SET)
-        os.dup2(again, number, inheritable=False)
-        os.close(again)
+        if place is not None:
+            os.lseek(own, place, os.SEEK_SET)
+        os.dup2(own, number, inheritable=False)
+        if place is not None:
+            os.close(own)
+
+
+def _opened_again(number: int) -> int:
+    """A descriptor of the same file with a place of its own; of a copy if it is there no more."""
+    try:
+        return os.open(f"/proc/self/fd/{number}", os.O_RDONLY)
+    except OSError:  # some kernels do not open what has no name any more
+        copied, start = os.memfd_create("copied"), 0
+        while piece := os.pread(number, CHUNK, start):
+            start += os.write(copied, piece)
+        return copied
 
 
 def outcome(work: Callable[[], Any]) -> bytes:

@@ -18,13 +18,14 @@ import sys
 import threading
 import time
 from collections import deque
-from collections.abc import Callable, Generator, Iterable
+from collections.abc import Callable, Generator, Iterable, Mapping
 from functools import cache
 from typing import Any, Generic, TypeVar
 
 from cavsumo.errors import BranchError
 from cavsumo.model.fork_child import (
     ALARM_AFTER_S,
+    CHUNK,
     HEAD,
     flush,
     has_children,
@@ -40,7 +41,6 @@ from cavsumo.model.processes import end_with_parent, ending
 Result = TypeVar("Result")
 
 MEASURED = 3  # forks of which the cost is taken
-CHUNK = 1 << 20  # bytes read at once
 
 
 def can_fork() -> bool:
@@ -85,9 +85,7 @@ class Fork(Generic[Result]):
         if self._pid == 0:
             try:
                 follow_parent()
-                stand_alone(open_now, deadline)
-                random.setstate(drawn)
-                send(sink, outcome(work))
+                send(sink, outcome(lambda: alone(open_now, deadline, drawn, work)))
                 leave()
             finally:
                 os._exit(1)
@@ -143,6 +141,15 @@ class Fork(Generic[Result]):
     def _length(self) -> int:
         """The length of the result, as far as it is known."""
         return int.from_bytes(self._received[:HEAD], "little")
+
+
+def alone(
+    open_now: Mapping[int, int | None], deadline: float, drawn: Any, work: Callable[[], Result]
+) -> Result:
+    """The result of a work in a child that shares nothing with its parent any more."""
+    stand_alone(open_now, deadline)
+    random.setstate(drawn)
+    return work()
 
 
 def forked(

@@ -142,13 +142,16 @@ def test_random_numbers_are_those_that_the_parent_would_draw() -> None:
     assert drawn == [(first := random.random()), first, np.random.random()]
 
 
-def test_a_file_that_is_read_is_read_on_by_all(tmp_path: Path) -> None:
+@pytest.mark.parametrize("removed", [False, True])
+def test_a_file_that_is_read_is_read_on_by_all(tmp_path: Path, removed: bool) -> None:
     """SUMO reads routes piece by piece: each process goes on from the same place."""
     file = tmp_path / "routes"
     file.write_bytes(b"0123456789")
     source = os.open(file, os.O_RDONLY)
     try:
         assert os.read(source, 4) == b"0123"
+        if removed:
+            file.unlink()
         assert outcomes(*[lambda: os.read(source, 3)] * 2) == [b"456", b"456"]
         assert os.read(source, 6) == b"456789"
     finally:

@@ -72,6 +72,7 @@ def content(found: Episode | BranchError) -> dict[str, Any]:
     assert isinstance(found, Episode), found
     monitors = {"contacts", "naturalness", "criticality"}
     fields = {f.name: getattr(found, f.name) for f in dataclasses.fields(found)}
+    fields["sumo_collisions"] = sorted(found.sumo_collisions)  # a set has no order
     texts = {name: repr(value) for name, value in fields.items() if name not in monitors}
     return {name: re.sub(r" at 0x\w+", "", text) for name, text in texts.items()}
 
