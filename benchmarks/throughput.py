@@ -158,7 +158,7 @@ def compare(runner: EpisodeRunner, episodes: int) -> Spent:
 
 def our_seconds(runner: EpisodeRunner, agents: list[Any], seed: int) -> tuple[float, float]:
     """How long cavsumo plays an episode, and how long of that it restarts."""
-    restart, ended = loop._reset, 0.0
+    restart, ended = loop.started, 0.0
 
     def clocked(*args: Any) -> Any:
         nonlocal ended
@@ -166,11 +166,11 @@ def our_seconds(runner: EpisodeRunner, agents: list[Any], seed: int) -> tuple[fl
         ended = time.perf_counter()
         return result
 
-    loop._reset = clocked
+    loop.started = clocked
     begun = time.perf_counter()
     loop.play(runner.setup, agents, seed)
     whole = time.perf_counter() - begun
-    loop._reset = restart
+    loop.started = restart
     return whole, ended - begun
 
 

@@ -15,7 +15,7 @@ import pytest
 from inline import cavsumo
 from support import CHROMIUM, ROOT, benchmark
 
-from cavsumo.assertions import criticality_monitor
+from cavsumo.assertions import ASSERTIONS, criticality_monitor
 
 pytestmark = pytest.mark.usefixtures("inline")
 NET = str(ROOT / "networks" / "pedestrians.net.xml")
@@ -27,6 +27,7 @@ def play(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) ->
     """Call with a benchmark, its words and values of its constants: what it prints."""
     monkeypatch.syspath_prepend(str(ROOT / "benchmarks"))
     monkeypatch.setenv("OPENBLAS_NUM_THREADS", "1")
+    own = set(ASSERTIONS)
 
     loaded: list[str] = []
 
@@ -42,6 +43,9 @@ def play(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) ->
         return capsys.readouterr().out
 
     yield played
+    for name in set(ASSERTIONS) - own:  # a benchmark may register one
+        del ASSERTIONS._entries[name]
+        ASSERTIONS.names._others.discard(name)
     for name in loaded:
         sys.modules.pop(name, None)
 
