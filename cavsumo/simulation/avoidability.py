@@ -34,7 +34,9 @@ from cavsumo.simulation.reruns import Rerun
 from cavsumo.simulation.setup import Setup
 
 MOST_RERUNS = 6  # a search that needs more reports its bounds
-USUAL_RERUNS = 3  # one at the perception, two that confirm a right guess
+# A rerun up to a takeover that takes this long [s] and as many forks is worth forking: on small
+# networks reruns from the start are as quick (benchmarks/README.md, Branches).
+SLOW_S, FORKS = 0.2, 4.0
 STRIDES = (1, 4)  # how far from the last answer the next one is asked for, then halfway [timesteps]
 NOTABLE_MPS = 1.5  # less speed lost avoids little
 FORK_S = 3600.0  # time for a fork, far above that of any episode; the caller's own ends it before
@@ -237,7 +239,7 @@ class AvoidabilityCheck:
         rerun = self._rerun(self.kept)
         rerun.advance(first)
         spent = math.inf if self.kept else time.process_time() - begun
-        pays = spent > cost_of_fork() * USUAL_RERUNS / (USUAL_RERUNS - 1)
+        pays = spent > SLOW_S and spent > FORKS * cost_of_fork()
         alone = False  # whether its simulation is used up, by itself or by another rerun
 
         def avoids(reference: Reference, step: int) -> bool:

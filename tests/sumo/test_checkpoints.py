@@ -45,6 +45,7 @@ def with_forks(patch: Patch, *, at_start: bool) -> None:
         patch.setattr(module, "can_fork", lambda: True)
         patch.setattr(module, "cost_of_fork", lambda: 0.0)
     patch.setattr(checkpoints, "QUICK_S", 0.0)
+    patch.setattr(avoidability, "SLOW_S", 0.0)
     if not at_start:
         patch.setattr(checkpoints, "cost_of_fork", lambda: math.inf)
 
