@@ -63,7 +63,7 @@ def stubs(episodes: int, file: Path) -> None:
         nonlocal played
         if batch_run.tally.rows >= played:
             print(
-                f"{batch_run.tally.rows:7} stubs:    parent {resident('self'):6.1f} MB", flush=True
+                f"{batch_run.tally.rows:7} stubs:    parent {resident('self')}", flush=True
             )
             played = {0: episodes // 100, episodes // 100: episodes // 10}.get(played, episodes)
         return False
@@ -73,7 +73,7 @@ def stubs(episodes: int, file: Path) -> None:
         batch_run.begin(manifest(prepared))
         batch_run.play()
         batch_run.end()
-    print(f"{batch_run.tally.rows:7} stubs:    parent {resident('self'):6.1f} MB")
+    print(f"{batch_run.tally.rows:7} stubs:    parent {resident('self')}")
 
 
 def real(episodes: int, file: Path) -> None:
@@ -84,9 +84,8 @@ def real(episodes: int, file: Path) -> None:
     for mark in (episodes // 100, episodes // 10, episodes * 99 // 100):
         while process.poll() is None and lines(file) < mark:
             time.sleep(0.05)
-        sizes = [resident(pid) for pid in (process.pid, *children(process.pid))]
-        worker = f"{sizes[1]:6.1f} MB" if len(sizes) > 1 else "gone"
-        print(f"{lines(file):7} episodes: parent {sizes[0]:6.1f} MB, worker {worker}")
+        parent, worker, *_ = *map(resident, (process.pid, *children(process.pid))), "gone"
+        print(f"{lines(file):7} episodes: parent {parent}, worker {worker}")
     process.wait()
 
 
@@ -95,12 +94,13 @@ def lines(file: Path) -> int:
     return file.read_bytes().count(b"\n") - 1 if file.exists() else 0
 
 
-def resident(pid: int | str) -> float:
-    """The resident size of a process [MB]."""
-    for line in Path(f"/proc/{pid}/status").read_text().splitlines():
+def resident(pid: int | str) -> str:
+    """The resident size of a process in words; a process may have ended meanwhile."""
+    status = Path(f"/proc/{pid}/status")
+    for line in status.read_text().splitlines() if status.exists() else ():
         if line.startswith("VmRSS"):
-            return int(line.split()[1]) / 1024
-    raise RuntimeError("no size")
+            return f"{int(line.split()[1]) / 1024:6.1f} MB"
+    return "gone"
 
 
 if __name__ == "__main__":
