@@ -62,9 +62,7 @@ def stubs(episodes: int, file: Path) -> None:
     def stopped() -> bool:
         nonlocal played
         if batch_run.tally.rows >= played:
-            print(
-                f"{batch_run.tally.rows:7} stubs:    parent {resident('self')}", flush=True
-            )
+            print(f"{batch_run.tally.rows:7} stubs:    parent {resident('self')}", flush=True)
             played = {0: episodes // 100, episodes // 100: episodes // 10}.get(played, episodes)
         return False
 
