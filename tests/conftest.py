@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 import importlib
 import math
+import re
 import sys
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
@@ -14,7 +15,7 @@ import pytest
 from inline import played_here
 from shapely.geometry import LineString, box
 from sites import derived_once
-from support import CHROMIUM, LAPTOP, OPTIONS, ROOT, prepared_at
+from support import CHROMIUM, LAPTOP, OPTIONS, ROOT, SHORT, prepared_at
 
 from cavsumo.agents.base import Scene
 from cavsumo.batch.episode_runner import EpisodeRunner
@@ -318,3 +319,37 @@ def found_failure(networks: dict[str, Path], tmp_path_factory: pytest.TempPathFa
     with played_here():
         assert main([*words, "--agent", "proximity", "--agent", "timing", "--runs", "8"]) == 0
     return file
+
+
+@pytest.fixture
+def bare(networks: dict[str, Path], tmp_path: Path) -> Callable[[str], Path]:
+    """Call with a network's name: the same one with lanes for bicycles in place of pavements."""
+
+    def strip(name: str) -> Path:
+        file = tmp_path / f"{name}.net.xml"
+        text = networks[name].read_text(encoding="utf-8")
+        edges = r'<edge id="[^:].*?</edge>'  # not the walking areas and crossings
+        for edge in re.findall(edges, text, flags=re.DOTALL):
+            text = text.replace(edge, edge.replace('allow="pedestrian"', 'allow="bicycle"'))
+        file.write_text(text, encoding="utf-8")
+        return file
+
+    return strip
+
+
+@pytest.fixture
+def make() -> Iterator[Callable[..., Any]]:
+    """Call with an id and settings for an environment on the straight road, closed afterwards."""
+    import gymnasium
+
+    import cavsumo.envs  # noqa: F401  (registers the environments)
+
+    made = []
+
+    def one(name: str = "Tester", **settings: Any) -> Any:
+        made.append(gymnasium.make(f"cavsumo/{name}-v0", **(SHORT | settings)))
+        return made[-1]
+
+    yield one
+    for env in made:
+        env.close()

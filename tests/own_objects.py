@@ -83,3 +83,16 @@ def of_objects(**more: Any) -> Results:
         trace="all",
         **more,
     )
+
+
+# The source of an object, for names of it in other sessions.
+DEFINED = """
+LIMIT = {limit}
+def half(x):
+    return x / 2
+class Careful:
+    def __init__(self, speed=3.0):
+        self.speed = speed
+    def act(self, snapshot):
+        return half(LIMIT) if snapshot in {{"one", "two", "three", "four"}} else self.speed
+"""

@@ -6,7 +6,7 @@ import math
 import subprocess
 import sys
 import warnings
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from typing import Any
 
 import gymnasium
@@ -19,20 +19,6 @@ from cavsumo.errors import AgentError, SimulationError
 
 IDS = ("cavsumo/Tester-v0", "cavsumo/Ego-v0")
 Make = Callable[..., Any]
-
-
-@pytest.fixture
-def make() -> Iterator[Make]:
-    """Call with an id and settings for an environment on the straight road, closed afterwards."""
-    made = []
-
-    def one(name: str = "Tester", **settings: Any) -> Any:
-        made.append(gymnasium.make(f"cavsumo/{name}-v0", **(SHORT | settings)))
-        return made[-1]
-
-    yield one
-    for env in made:
-        env.close()
 
 
 def test_importing_or_naming_the_package_registers_the_environments() -> None:

@@ -5,16 +5,7 @@ from __future__ import annotations
 import subprocess
 import sys
 
-DEFINED = """
-LIMIT = {limit}
-def half(x):
-    return x / 2
-class Careful:
-    def __init__(self, speed=3.0):
-        self.speed = speed
-    def act(self, snapshot):
-        return half(LIMIT) if snapshot in {{"one", "two", "three", "four"}} else self.speed
-"""
+from own_objects import DEFINED
 
 
 def test_a_name_is_the_same_in_every_session() -> None:

@@ -42,20 +42,6 @@ IDS = ("cavsumo/Tester-v0", "cavsumo/Ego-v0")
 Make = Callable[..., Any]
 
 
-@pytest.fixture
-def make() -> Iterator[Make]:
-    """Call with an id and settings for an environment on the straight road, closed afterwards."""
-    made = []
-
-    def one(name: str = "Tester", **settings: Any) -> Any:
-        made.append(gymnasium.make(f"cavsumo/{name}-v0", **(SHORT | settings)))
-        return made[-1]
-
-    yield one
-    for env in made:
-        env.close()
-
-
 def to_the_end(env: Any, actions: Iterator[Any] | None = None) -> list[Any]:
     """What every step of the rest of an episode returns, with sampled actions if none are given."""
     steps = []

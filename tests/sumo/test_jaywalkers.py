@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Callable
 from pathlib import Path
 
@@ -10,22 +9,6 @@ import pytest
 
 from cavsumo import cli
 from cavsumo.results.reading import read_rows
-
-
-@pytest.fixture
-def bare(networks: dict[str, Path], tmp_path: Path) -> Callable[[str], Path]:
-    """Call with a network's name: the same one with lanes for bicycles in place of pavements."""
-
-    def strip(name: str) -> Path:
-        file = tmp_path / f"{name}.net.xml"
-        text = networks[name].read_text(encoding="utf-8")
-        edges = r'<edge id="[^:].*?</edge>'  # not the walking areas and crossings
-        for edge in re.findall(edges, text, flags=re.DOTALL):
-            text = text.replace(edge, edge.replace('allow="pedestrian"', 'allow="bicycle"'))
-        file.write_text(text, encoding="utf-8")
-        return file
-
-    return strip
 
 
 def test_jaywalkers_find_failures_where_there_is_no_pavement(

@@ -6,6 +6,7 @@ import gc
 from typing import Any
 
 import pytest
+from own_objects import DEFINED
 
 from cavsumo.errors import InputError
 from cavsumo.model.objects import (
@@ -17,17 +18,6 @@ from cavsumo.model.objects import (
     sent,
     take,
 )
-
-DEFINED = """
-LIMIT = {limit}
-def half(x):
-    return x / 2
-class Careful:
-    def __init__(self, speed=3.0):
-        self.speed = speed
-    def act(self, snapshot):
-        return half(LIMIT) if snapshot in {{"one", "two", "three", "four"}} else self.speed
-"""
 
 
 def careful(limit: int = 3, before: str = "") -> Any:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import dataclasses
 import math
-import re
 from collections.abc import Callable
 from pathlib import Path
 
@@ -23,22 +22,6 @@ from cavsumo.network.site import Site
 Staged = Callable[..., tuple[BatchPlan, Site]]
 # Which way a path turns between its ends [degrees].
 TURNING = {"straight": (-45.0, 45.0), "left": (45.0, 150.0), "right": (-150.0, -45.0)}
-
-
-@pytest.fixture
-def bare(networks: dict[str, Path], tmp_path: Path) -> Callable[[str], Path]:
-    """Call with a network's name: the same one with lanes for bicycles in place of pavements."""
-
-    def strip(name: str) -> Path:
-        file = tmp_path / f"{name}.net.xml"
-        text = networks[name].read_text(encoding="utf-8")
-        edges = r'<edge id="[^:].*?</edge>'  # not the walking areas and crossings
-        for edge in re.findall(edges, text, flags=re.DOTALL):
-            text = text.replace(edge, edge.replace('allow="pedestrian"', 'allow="bicycle"'))
-        file.write_text(text, encoding="utf-8")
-        return file
-
-    return strip
 
 
 def turned(site: Site) -> float:
