@@ -74,7 +74,7 @@ def _in_place(batch: CheckedBatch, manner: Manner) -> CheckedBatch:
     if other is None:
         return batch
     if not (manner.overwrite or manner.scratch):
-        check_kept(batch.output, batch.manifest)
+        raise _kept(batch.output, other, batch.manifest)
     return dataclasses.replace(batch, replaced=episodes_of(other))
 
 
@@ -82,11 +82,16 @@ def check_kept(output: Path, manifest: Mapping[str, Any]) -> None:
     """Raise ResultsError where another finished batch lies in a file that the user named."""
     other = other_batch(output, manifest)
     if other is not None:
-        different = next(differences(other, manifest, apart=UNESSENTIAL))
-        raise ResultsError(
-            f"results {str(output)!r}: hold another finished batch of {episodes_of(other)} "
-            f"episodes ({different}); --overwrite replaces it"
-        )
+        raise _kept(output, other, manifest)
+
+
+def _kept(output: Path, other: Mapping[str, Any], manifest: Mapping[str, Any]) -> ResultsError:
+    """The error for another finished batch, which names a difference."""
+    different = next(differences(other, manifest, apart=UNESSENTIAL))
+    return ResultsError(
+        f"results {str(output)!r}: hold another finished batch of {episodes_of(other)} "
+        f"episodes ({different}); --overwrite replaces it"
+    )
 
 
 def other_batch(output: Path, manifest: Mapping[str, Any]) -> dict[str, Any] | None:
