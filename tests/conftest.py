@@ -6,6 +6,7 @@ import dataclasses
 import importlib
 import math
 import re
+import subprocess
 import sys
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
@@ -25,11 +26,13 @@ from cavsumo.batch.replay import Record
 from cavsumo.cli import main
 from cavsumo.egos import make_ego
 from cavsumo.egos.base import EGO_KIND
+from cavsumo.errors import InputError
 from cavsumo.model.bodies import PEDESTRIAN, Body, Kind
 from cavsumo.model.carriageway import Roads, Start
 from cavsumo.model.polyline import Path as Polyline
 from cavsumo.model.scenario import BatchPlan, plan_from
 from cavsumo.model.snapshot import BodyState, Snapshot
+from cavsumo.network.osm.netconvert import sumo_home
 from cavsumo.network.site import Site
 from cavsumo.results.traces import Trace, parsed
 from cavsumo.sumo.world import World
@@ -49,6 +52,16 @@ def _own_cache(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
     with pytest.MonkeyPatch.context() as patched:
         patched.setenv("XDG_CACHE_HOME", str(tmp_path_factory.mktemp("cache")))
         yield
+
+
+@pytest.fixture(scope="session")
+def netconvert() -> None:
+    """Skips where the programs of eclipse-sumo are missing, or a library that they need."""
+    try:
+        program = sumo_home() / "bin" / "netconvert"
+        subprocess.run([program, "--version"], check=True, capture_output=True, timeout=60)
+    except (InputError, OSError, subprocess.SubprocessError) as error:
+        pytest.skip(f"no netconvert here: {error}")
 
 
 @pytest.fixture(scope="session", autouse=True)

@@ -13,7 +13,6 @@ import os
 import subprocess
 import sys
 from collections.abc import Mapping
-from importlib.util import find_spec
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
@@ -22,6 +21,7 @@ from xml.sax.saxutils import quoteattr
 from cavsumo.errors import InputError
 from cavsumo.model.scenario import Scenario
 from cavsumo.network.drawing.place import COLOURS, DrawnPlace, site_drawn
+from cavsumo.network.osm.extract import EXTRA
 from cavsumo.network.osm.netconvert import sumo_environment, sumo_home
 from cavsumo.network.site import Site
 from cavsumo.results.traces import Shape, Trace, states
@@ -42,9 +42,10 @@ def check_gui(delay_ms: float | None = None) -> Path:
     """sumo-gui's file; raises InputError in one sentence when it cannot be shown."""
     if delay_ms is not None and not 0.0 <= delay_ms <= DELAY_MOST:
         raise InputError(f"--delay must lie in [0, {DELAY_MOST:g}] ms, got {delay_ms:g}")
-    if find_spec("sumo") is None or find_spec("traci") is None:
-        raise InputError("--gui needs sumo-gui: pip install 'cavsumo[osm]'")
-    program = sumo_home() / "bin" / "sumo-gui"
+    try:
+        program = sumo_home() / "bin" / "sumo-gui"
+    except InputError as error:
+        raise InputError(f"--gui needs sumo-gui: {EXTRA}") from error
     if not program.is_file():
         raise InputError(f"--gui: no sumo-gui at {str(program)!r}")
     if sys.platform == "linux" and not (os.environ.get("DISPLAY") or os.getenv("WAYLAND_DISPLAY")):

@@ -6,7 +6,6 @@ import shutil
 import subprocess
 import time
 from collections.abc import Iterator
-from importlib.util import find_spec
 from pathlib import Path
 
 import pytest
@@ -17,18 +16,17 @@ from cavsumo.errors import Exit, InputError
 from cavsumo.interop import gui
 from cavsumo.interop.gui import additional_file, check_gui, command, show
 from cavsumo.network.drawing.place import site_drawn
+from cavsumo.network.osm import netconvert as program
 from cavsumo.network.site import Site
 from cavsumo.results.traces import Trace
 
 
 @pytest.fixture
-def display(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Iterator[str]:
+def display(monkeypatch: pytest.MonkeyPatch, tmp_path: Path, netconvert: None) -> Iterator[str]:
     """A screen that nobody sees."""
     server = shutil.which("Xvfb")
     if server is None:
         pytest.skip("no Xvfb here: apt-get install xvfb")
-    if find_spec("sumo") is None or find_spec("traci") is None:
-        pytest.skip("no sumo-gui here: pip install 'cavsumo[osm]'")
     with (tmp_path / "number").open("w+b") as said:
         number = str(said.fileno())
         process = subprocess.Popen(
@@ -77,6 +75,7 @@ def test_sumo_is_given_the_route_that_everybody_draws(
     assert all(abs(site.route.path.project(x, y).lateral) < 0.05 for x, y in shape)
 
 
+@pytest.mark.usefixtures("netconvert")
 def test_without_a_display_it_says_so(
     monkeypatch: pytest.MonkeyPatch, found_failure: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -91,7 +90,7 @@ def test_without_a_display_it_says_so(
 
 def test_without_sumo_gui_it_says_what_to_install(monkeypatch: pytest.MonkeyPatch) -> None:
     """The extra that brings it."""
-    monkeypatch.setattr(gui, "find_spec", lambda name: None)
+    monkeypatch.setattr(program, "find_spec", lambda name: None)
     with pytest.raises(InputError, match=r"pip install 'cavsumo\[osm\]'"):
         check_gui()
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import importlib.util
 from collections.abc import Callable
 from pathlib import Path
 
@@ -13,9 +12,7 @@ from cavsumo.network.inspection import best_junctions, ground
 from cavsumo.network.intersections import WIDEST_M, intersections
 from cavsumo.network.reader import read_network
 
-pytestmark = pytest.mark.skipif(
-    importlib.util.find_spec("sumo") is None, reason="eclipse-sumo is not installed"
-)
+pytestmark = pytest.mark.usefixtures("netconvert")
 Nodes = dict[str, tuple[float, float]]
 Edges = list[tuple[str, str, str]]  # from, to, name of the street
 Built = Callable[..., Path]

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import gzip
-import importlib.util
 import re
 import sys
 import tracemalloc
@@ -26,9 +25,7 @@ from cavsumo.network.reader import read_network
 CROSSROADS = DATA / "crossroads.osm"
 WEST_HALF = "121.3970,31.1980,121.3989,31.2020"  # the junction without traffic lights
 
-needs_netconvert = pytest.mark.skipif(
-    importlib.util.find_spec("sumo") is None, reason="eclipse-sumo is not installed"
-)
+needs_netconvert = pytest.mark.usefixtures("netconvert")
 Import = Callable[..., Path]
 Capture = pytest.CaptureFixture[str]
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import html
-import importlib.util
 import json
 import os
 import re
@@ -30,9 +29,7 @@ Capture = pytest.CaptureFixture[str]
 Staged = Callable[..., Any]
 ALL = pytest.mark.parametrize("name", ["pedestrians", "crossing", "junction"])
 
-needs_netconvert = pytest.mark.skipif(
-    importlib.util.find_spec("sumo") is None, reason="eclipse-sumo is not installed"
-)
+needs_netconvert = pytest.mark.usefixtures("netconvert")
 
 
 @pytest.fixture(scope="module")
