@@ -111,7 +111,7 @@ def strategies(whole: Whole, *, simulated: bool) -> dict[str, st.SearchStrategy[
     study = {"net": "road.net.xml", "runs": 2, "vary": vary}
     base = {k: v for k, v in whole.files.items()}
     lines = [json.loads(line) for line in whole.text("found/run000000.jsonl").splitlines()[:6]]
-    road = "run -n road.net.xml --ego constant --end 3 --reset shared"
+    road = "run -n road.net.xml --ego constant --end 3"
     net, osm = whole.text("road.net.xml"), whole.text("cross.osm")
 
     def case(name: str, data: Any, *words: str) -> st.SearchStrategy[Case]:

@@ -17,7 +17,6 @@ from cavsumo.batch.stopping import stopping_rule
 from cavsumo.batch.tally import Tally
 from cavsumo.egos.ego_files import OutputWatch
 from cavsumo.errors import BatchError
-from cavsumo.model.scenario import BatchPlan
 from cavsumo.results.reading import COMPLETE, check_cells, rows_of
 from cavsumo.results.rows import Outcome
 from cavsumo.results.writing import Recorder
@@ -100,9 +99,7 @@ class BatchRun:
         A learning agent did not learn from such an episode: it starts anew, and its later rows
         change.
         """
-        todo, relearning = _to_retry(
-            self.recorder.csv_file, self.prepared.plan, self._knowledge.names
-        )
+        todo, relearning = _to_retry(self.recorder.csv_file, self._knowledge.names)
         known = self._knowledge.known()
         self._knowledge.forget(relearning)
         replaced: dict[int, Outcome] = {}
@@ -149,22 +146,18 @@ class BatchRun:
         )
 
 
-def _to_retry(
-    csv_file: Path, plan: BatchPlan, learners: frozenset[str]
-) -> tuple[list[int], frozenset[str]]:
+def _to_retry(csv_file: Path, learners: frozenset[str]) -> tuple[list[int], frozenset[str]]:
     """The episodes to play again, and the learners that start anew because they have any.
 
-    Those are all episodes of such a learner, and all that shared a simulation with an error.
+    Those are all episodes of such a learner, and the errors.
     """
     runs: dict[str, list[int]] = {name: [] for name in learners}
-    errors, relearning, last = set(), set(), -1
+    again, relearning = set[int](), set[str]()
     for row in rows_of(csv_file):
-        last = int(row["run"])
         if row["agent"] in learners:
-            runs[row["agent"]].append(last)
+            runs[row["agent"]].append(int(row["run"]))
         if row["outcome"] == "error":
-            errors.add(last // plan.block)
+            again.add(int(row["run"]))
             relearning |= {row["agent"]} & learners
-    again = {run for group in errors for run in range(group * plan.block, (group + 1) * plan.block)}
     again |= {run for name in relearning for run in runs[name]}
-    return sorted(run for run in again if run <= last), frozenset(relearning)
+    return sorted(again), frozenset(relearning)

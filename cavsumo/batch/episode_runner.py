@@ -16,7 +16,6 @@ from cavsumo.batch.prepared import PreparedBatch
 from cavsumo.egos.reference import REFERENCES
 from cavsumo.errors import CavsumoError, EgoError
 from cavsumo.model.objects import is_instance
-from cavsumo.model.scenario import Simulation
 from cavsumo.model.seeds import episode_seed
 from cavsumo.results.columns import Row, row_of
 from cavsumo.results.rows import Outcome
@@ -60,8 +59,7 @@ class EpisodeRunner:
                 raise
         for member in self.prepared.cast:
             self._team(member.label)[0][0].prepare()
-        simulation: Simulation = "own" if self.plan.reset == "fresh" else "new"
-        self.setup.world.reset(episode_seed(self.plan.seed, 0), (), (), simulation=simulation)
+        self.setup.world.reset(episode_seed(self.plan.seed, 0), (), ())
 
     def play(self, job: Job, beat: Callable[[], None] = lambda: None) -> Answer:
         """Play a job; ``beat`` is called when another simulation begins for it."""
@@ -70,9 +68,8 @@ class EpisodeRunner:
         try:
             agents = self.agents_of(job)
             before = _recall(agents)
-            own = job.simulation == "own"
-            record = job.record or (self.plan.trace != "none" and own)
-            retry = own and self.plan.reference != "none"
+            record = job.record or self.plan.trace != "none"
+            retry = self.plan.reference != "none"
 
             def check(episode: Episode, kept: EpisodeLoop | None = None) -> AvoidabilityCheck:
                 demand = job.recorded.departures if job.recorded else None
@@ -82,10 +79,9 @@ class EpisodeRunner:
             if job.recorded is not None:
                 episode = played_back(self.setup, job.recorded)
             else:
-                how: dict[str, Any] = {"keep": retry, "simulation": job.simulation}
                 asked, deadline = check if retry else None, self.plan.deadline_s / 2
                 loop, checkpoint = begun(
-                    self.setup, agents, job.seed, asked, deadline, record=record, **how
+                    self.setup, agents, job.seed, asked, deadline, record=record, keep=retry
                 )
                 episode = played_on(loop)
             memory = _recall(agents)

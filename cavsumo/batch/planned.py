@@ -14,6 +14,7 @@ from cavsumo.batch.manner import Manner
 from cavsumo.batch.plan_names import check_names
 from cavsumo.errors import InputError, ResultsError
 from cavsumo.model.scenario import BatchPlan, plan_from
+from cavsumo.model.scenario.gone import without_gone
 from cavsumo.model.study import Part
 from cavsumo.network.network_file import root_of
 from cavsumo.results.present import input_files, present_paths
@@ -114,7 +115,7 @@ def recorded_settings(recorded: Mapping[str, Any] | None) -> dict[str, Any]:
     if recorded is None:
         return {}
     try:
-        plan = dict(recorded["plan"])
+        plan = without_gone(recorded["plan"])
         flat = {"routes": "none"} | {k: v for k, v in plan.pop("scenario").items() if v is not None}
         return flat | {k: v for k, v in plan.items() if v is not None}
     except (KeyError, TypeError, ValueError, AttributeError) as error:

@@ -89,7 +89,6 @@ def _play(
         recorder.traces,
         prepared.plan.reference,
         sequential=looks_at_rows(prepared.plan),
-        shared=prepared.plan.reset == "shared",
         cut_short=batch_run.cut_short or batch_run.status == "interrupted",
         promises={member.label: member.promise for member in prepared.cast},
     )

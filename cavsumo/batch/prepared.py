@@ -31,9 +31,9 @@ from cavsumo.network.traffic import Volume
 from cavsumo.network.traffic_lights import Pace
 from cavsumo.results.present import input_files
 from cavsumo.results.provenance import checksums, traffic_checksum, unequal, versions
-from cavsumo.sumo.demand import BEYOND_S
 from cavsumo.sumo.options import OPTIONS
 
+BEYOND_S = 60.0  # how far beyond the horizon there must be demand, for waits and overtime
 OUTPUTS = "ego_outputs"  # in a manifest: the files of its command that an ego wrote
 
 
@@ -123,11 +123,10 @@ def prepare(plan: BatchPlan, ego: Ego | None = None) -> PreparedBatch:
     assertions_of(scenario)
     kind = kind_named(scenario.kind)
     _check_kind(scenario, kind, cast)
-    if cast.learners and (plan.shard or plan.reset == "shared"):
-        what = f"shard {plan.shard}" if plan.shard else "reset shared"
+    if cast.learners and plan.shard:
         raise InputError(
-            f"{what}: {' and '.join(sorted(cast.learners))} learns from episode to episode, in "
-            "sequence; learn=false plays what was learned"
+            f"shard {plan.shard}: {' and '.join(sorted(cast.learners))} learns from episode to "
+            "episode, in sequence; learn=false plays what was learned"
         )
     ego = ego or make_ego(scenario.ego, scenario.ego_params)
     if scenario.ego_sensor and type(ego).act is Ego.act:

@@ -13,7 +13,7 @@ from cavsumo.batch.jobs import Job, Memory, job
 from cavsumo.batch.messages import Answer
 from cavsumo.batch.prepared import PreparedBatch, prepare
 from cavsumo.batch.trust import check_trust
-from cavsumo.batch.worker import Worker, search
+from cavsumo.batch.worker import Worker
 from cavsumo.errors import DivergenceError, ResultsError, shown
 from cavsumo.model.bodies import STEERING, THROTTLE
 from cavsumo.model.scenario import BatchPlan
@@ -110,8 +110,8 @@ def recorded_alone(
         raise ResultsError(f"{name}: its plan has no agent {shown(row['agent'])}")
     if row["reset"] == "shared":
         raise ResultsError(
-            f"{name}: was played in a simulation that other episodes used before; replay it from "
-            "its results"
+            f"{name}: was played in a simulation that other episodes had used before, and is not "
+            "played so any more"
         )
     if anew and not kept:
         raise ResultsError(
@@ -134,7 +134,7 @@ def replayed(worker: Worker, record: Record) -> Replayed:
     """An episode once more, after the earlier episodes on which it depends.
 
     Learners first play their earlier episodes, or get their knowledge from the trace if it stands
-    alone; an episode of a shared simulation comes after those before it.
+    alone.
     """
     outcome = _played_again(worker, record).outcome
     return Replayed(outcome.row, parsed(outcome.trace) if outcome.trace else None)
@@ -147,9 +147,6 @@ def _played_again(worker: Worker, record: Record) -> Answer:
         row, memory = record.row, record.trace.head["memory"]
         again = Job(run, row["agent"], int(row["seed"]), memory, record=True)
         return worker.play(again)
-    if record.row["reset"] == "shared":
-        first = run - run % plan.block
-        return search(worker, [job(plan, i) for i in range(first, run + 1)])[-1]
     return worker.play(dataclasses.replace(job(plan, run, known(worker, run)), record=True))
 
 

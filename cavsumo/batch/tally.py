@@ -25,7 +25,6 @@ class Found:
 
     Attributes:
         outcomes: the number of episodes with each outcome.
-        fresh: the number of rows of episodes in a simulation of their own.
         times: when tests were triggered, by time [s] to three decimals.
         censored: when valid episodes without a test ended, likewise.
         verdicts: for each assertion, how often it said what.
@@ -37,7 +36,6 @@ class Found:
     """
 
     outcomes: Counter[str] = field(default_factory=Counter)
-    fresh: int = 0
     times: Counter[float] = field(default_factory=Counter)
     censored: Counter[float] = field(default_factory=Counter)
     verdicts: dict[str, Counter[str]] = field(default_factory=dict)
@@ -136,7 +134,6 @@ class Tally:
         found = self.agents.setdefault(row["agent"], Found())
         self.rows += 1
         found.outcomes[row["outcome"]] += 1
-        found.fresh += row.get("reset") == "fresh"
         for name, verdict in verdicts_of(row).items():
             found.verdicts.setdefault(name, Counter())[verdict] += 1
         if row.get("forecast"):
@@ -183,7 +180,6 @@ def found_by(agents: Iterable[Found]) -> Found:
     together = Found()
     for found in agents:
         together.outcomes.update(found.outcomes)
-        together.fresh += found.fresh
         together.kinds.update(found.kinds)
         together.arrivals.update(found.arrivals)
         together.lost_s += found.lost_s

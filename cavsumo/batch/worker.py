@@ -7,7 +7,6 @@ therefore waits on a pipe with a deadline, and a crash or a hang costs one row.
 from __future__ import annotations
 
 import contextlib
-import dataclasses
 import os
 import signal
 import socket
@@ -17,7 +16,7 @@ import sys
 import tempfile
 import threading
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from multiprocessing import Pipe
 from multiprocessing.connection import Connection
 
@@ -28,8 +27,6 @@ from cavsumo.errors import BatchError, InputError
 from cavsumo.model.offspring import kill_descendants
 from cavsumo.model.own_folders import OwnFolder, sweep_once
 from cavsumo.model.processes import by_a_lasting_thread, ending, inner_environment
-from cavsumo.model.scenario import Simulation
-from cavsumo.results.rows import is_test
 
 STARTUP_S = 120.0  # imports, SUMO's first start and that of the ego, on a slow machine
 STUCK_S = 20  # longest interruption of a message
@@ -261,29 +258,9 @@ def join_group(group: set[Worker]) -> None:
     _THREAD.group = group
 
 
-def play(prepared: PreparedBatch, jobs: Sequence[Job]) -> list[Answer]:
-    """Play jobs in a process of this thread; the function that every executor calls.
-
-    Several jobs share one simulation. Tests found there are played again, each in a simulation of
-    its own, which counts.
-    """
-    worker = _own_worker(prepared)
-    if prepared.plan.reset == "fresh":
-        return [worker.play(job) for job in jobs]
-    return [
-        worker.play(job) if is_test(answer.outcome.row) else answer
-        for job, answer in zip(jobs, search(worker, jobs), strict=True)
-    ]
-
-
-def search(worker: Worker, jobs: Sequence[Job]) -> list[Answer]:
-    """Play jobs one after another in one simulation; after an error, in a new one."""
-    answers: list[Answer] = []
-    for job in jobs:
-        goes_on = bool(answers) and answers[-1].outcome.row["outcome"] != "error"
-        simulation: Simulation = "same" if goes_on else "new"
-        answers.append(worker.play(dataclasses.replace(job, simulation=simulation)))
-    return answers
+def play(prepared: PreparedBatch, job: Job) -> Answer:
+    """Play a job in a process of this thread; the function that every executor calls."""
+    return _own_worker(prepared).play(job)
 
 
 def try_out(prepared: PreparedBatch) -> None:

@@ -109,9 +109,10 @@ _ALL = (
     Column("testers", "number of tester bodies", "", lambda f: f.plan.scenario.testers),
     Column(
         "reset",
-        "fresh: in a simulation of its own; shared: in one that other episodes used before",
+        "fresh: in a simulation of its own, always since 0.2; shared: in one that other episodes "
+        "used before",
         "",
-        lambda f: "fresh" if f.fresh else "shared",
+        lambda _: "fresh",
         words=True,
     ),
     Column(

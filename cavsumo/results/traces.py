@@ -37,7 +37,7 @@ FORMATS = ("cavsumo-trace-1", FORMAT)  # the first has neither starts, actions n
 NOT_REPLAYED = ("wall_s", "trace")
 # Settings that say how a batch is played and kept and not what its episodes are; what is known is
 # the memory in the head.
-MANNER = EXTENT | {"shard", "trace", "reset", "known"}
+MANNER = EXTENT | {"shard", "trace", "known"}
 MEMORY_MOST = 100_000  # characters of what an agent knew; one that knew more is not kept
 
 

@@ -161,11 +161,6 @@ def _replayed(
 ) -> Generator[Episode | BranchError]:
     """Branches played here, after which the episode's own simulation is brought back."""
     told = loop.setup.world.told
-    if not loop.setup.world.repeatable:
-        raise BranchError(
-            "a simulation that serves several episodes is branched by a fork alone, which this "
-            "process cannot have or was not to have"
-        )
     try:
         for how in continuations:
             with _own_numbers():

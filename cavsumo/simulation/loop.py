@@ -23,7 +23,6 @@ from cavsumo.model.bodies import Action
 from cavsumo.model.carriageway import Start
 from cavsumo.model.departures import Demand
 from cavsumo.model.kinematics import step_floats
-from cavsumo.model.scenario import Simulation
 from cavsumo.model.scene import Scene
 from cavsumo.model.snapshot import BodyState, Snapshot
 from cavsumo.simulation.ego_progress import EgoProgress, ego_progress
@@ -90,7 +89,6 @@ class EpisodeLoop:
         seed: of the episode; every random number in it comes from here.
         record: keep every snapshot, and show everybody in it.
         keep: keep every snapshot as it is, and what the agents chose, to play it again.
-        simulation: whose it is played in (``World.reset``).
         demand: departures of the background that were recorded, in place of the scenario's demand.
 
     Attributes:
@@ -111,12 +109,11 @@ class EpisodeLoop:
         *,
         record: bool = False,
         keep: bool = False,
-        simulation: Simulation = "own",
         demand: Demand | None = None,
     ) -> None:
         self.setup, self._agents = setup, agents
         self.scene, self._senses, begun, self._generators = started(
-            setup, agents, seed, record, simulation, demand
+            setup, agents, seed, record, demand
         )
         self.placed, self.snapshot = begun, begun.snapshot
         self._place = setup.world.begun
@@ -280,12 +277,9 @@ def play(
     *,
     record: bool = False,
     keep: bool = False,
-    simulation: Simulation = "own",
 ) -> Episode:
     """A whole episode; the arguments are those of ``EpisodeLoop``."""
-    return played_on(
-        EpisodeLoop(setup, agents, seed, record=record, keep=keep, simulation=simulation)
-    )
+    return played_on(EpisodeLoop(setup, agents, seed, record=record, keep=keep))
 
 
 def played_on(loop: EpisodeLoop) -> Episode:

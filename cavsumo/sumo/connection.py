@@ -1,4 +1,4 @@
-"""SUMO's simulation: one for each episode, or one for several episodes.
+"""SUMO's simulation, one for each episode.
 
 It calls SUMO through given functions, so that ``world`` stays the one boundary.
 """
@@ -12,9 +12,8 @@ from typing import Any
 from cavsumo.egos.base import Ego
 from cavsumo.errors import SimulationError
 from cavsumo.model.departures import Attributes, Demand
-from cavsumo.model.scenario import Scenario, Simulation
+from cavsumo.model.scenario import Scenario
 from cavsumo.network.site import Site
-from cavsumo.sumo.demand import BEYOND_S, Departures, Lights, cleared, noted, types_only
 from cavsumo.sumo.options import OPTIONS
 from cavsumo.sumo.recorded_demand import route_file, types_told
 from cavsumo.sumo.vehicle_types import type_file
@@ -35,45 +34,30 @@ class Simulations:
         self._sumo, self._scenario, self._site = sumo, scenario, site
         self._types = folder / "types.add.xml"
         self._types.write_text(type_file(scenario, ego), encoding="utf-8")
-        self._kept = folder / "kept.add.xml"  # what stays of the demand when we send it ourselves
         self._recorded = folder / "recorded.rou.xml"  # departures that are played back
         self._net, self.routes = scenario.net_file, scenario.routes_file
         if site.demand is not None:
             self.routes = folder / "traffic.rou.xml"
             self.routes.write_text(site.demand, encoding="utf-8")
-        self._demand: Demand | None = None
-        self._departures: Departures | None = None
 
-    def begin(self, seed: int, simulation: Simulation, demand: Demand | None = None) -> None:
-        """Start SUMO, or put it back to how it was when it started (``World.reset``).
+    def begin(self, seed: int, demand: Demand | None = None) -> None:
+        """Start SUMO (``World.reset``).
 
-        ``demand``: recorded departures in place of the scenario's demand, in a simulation of their
-        own.
+        ``demand``: recorded departures in place of the scenario's demand.
         """
-        if simulation == "same" and self._departures is not None:
-            cleared(self._sumo)
-            self._lights.restore()
-            self._departures.begin()
-            return
-        self._departures = None
+        routes = self.routes
+        if demand is not None:
+            routes = self._recorded
+            routes.write_text(route_file(demand), encoding="utf-8")
         self._sumo.close()
-        if simulation == "own":
-            routes = self.routes
-            if demand is not None:
-                routes = self._recorded
-                routes.write_text(route_file(demand), encoding="utf-8")
-            self._sumo.start(self.command(seed, routes))
-            self.set_light()
-        else:
-            self._start_shared(seed)
+        self._sumo.start(self.command(seed, routes))
+        self.set_light()
         route = self._site.route
         self._sumo.route.add("cavsumo_ego", list(route.edges))
         self._sumo.route.add("cavsumo_tester", [route.edges[0]])
 
     def advance(self) -> None:
         """One timestep of SUMO."""
-        if self._departures is not None:
-            self._departures.send()
         self._sumo.simulationStep()
 
     def set_light(self) -> None:
@@ -96,33 +80,12 @@ class Simulations:
         return types_told(self.routes, self._scenario.additional_files)
 
     def command(self, seed: int, routes: Path | None) -> list[str]:
-        """The command line of SUMO; without routes the types of a demand that is sent by us."""
+        """The command line of SUMO."""
         scenario = self._scenario
         more = [*scenario.additional_files, self._types]
-        if routes is None and self._kept.exists():
-            more.append(self._kept)
         files = ["-n", str(self._net), "-a", ",".join(str(f) for f in more)]
         if routes is not None:
             files += ["-r", str(routes)]
         options = [word for k, v in OPTIONS.items() for word in (f"--{k}", v)]
         clock = ["--step-length", f"{scenario.step_length:g}", "--seed", str(seed % 2**31)]
         return ["sumo", *files, *options, *clock]
-
-    def _start_shared(self, seed: int) -> None:
-        """Start SUMO without the demand, which each episode then sends by itself."""
-        if self._demand is None:
-            self._demand = self._noted()
-        self._sumo.start(self.command(seed, None))
-        self.set_light()
-        self._lights = Lights(self._sumo)
-        self._departures = Departures(self._sumo, self._demand, self._scenario.step_length)
-
-    def _noted(self) -> Demand:
-        """The demand, as SUMO carries it out without ego and testers."""
-        if self.routes is None:
-            return Demand()
-        self._kept.write_text(types_only(self.routes), encoding="utf-8")
-        self._sumo.start(self.command(1, self.routes))
-        demand = noted(self._sumo, self._scenario.end + BEYOND_S)
-        self._sumo.close()
-        return demand

@@ -27,12 +27,12 @@ from cavsumo.model.carriageway import Start
 from cavsumo.model.departures import Demand
 from cavsumo.model.geometry import Box, gap
 from cavsumo.model.kinematics import steering_for_turn, step_floats, wrap
-from cavsumo.model.scenario import Scenario, Simulation
+from cavsumo.model.scenario import Scenario
 from cavsumo.model.snapshot import BodyState, RawState, Snapshot
 from cavsumo.network.site import Site
 from cavsumo.sumo.background import Background, Roaming, roaming
 from cavsumo.sumo.connection import Simulations
-from cavsumo.sumo.demand import DepartureNotes
+from cavsumo.sumo.departure_notes import DepartureNotes
 from cavsumo.sumo.poses import from_sumo, front
 from cavsumo.sumo.reseeding import reseed
 
@@ -101,7 +101,6 @@ class World:
         starts: Sequence[Start],
         *,
         everything: bool = True,
-        simulation: Simulation = "own",
         demand: Demand | None = None,
         note: bool = False,
     ) -> Snapshot:
@@ -109,19 +108,17 @@ class World:
         starts.
 
         Args:
-            simulation: "own" starts SUMO afresh, for the same bits after any history; "new"
-                starts one that serves several episodes, of which the later ones say "same".
             everything: show the whole background in every snapshot; else only those who may touch
                 the ego or a tester, which is all that contacts need.
             demand: departures that were noted in another episode, in place of the scenario's own
-                demand; only in an own simulation.
+                demand.
             note: note who departs (``departures``).
 
         Raises SimulationError with SUMO's message if SUMO refuses, or if the ego finds no room to
         enter.
         """
         self.begun += 1
-        how = everything, simulation, demand, note
+        how = everything, demand, note
         self._calls = [("_begin", (seed, tuple(states), tuple(starts), *how))]
         return self._begin(seed, states, starts, *how)
 
@@ -131,7 +128,6 @@ class World:
         states: Sequence[BodyState],
         starts: Sequence[Start],
         everything: bool,
-        simulation: Simulation,
         demand: Demand | None,
         note: bool,
     ) -> Snapshot:
@@ -144,11 +140,9 @@ class World:
         self._commanded = False
         self._vehicles: tuple[str, ...] = ()
         self._departures: DepartureNotes | None = None
-        if simulation == "same":
-            self._check_own()
         _PLAYING[0] = self._mark
         with self._listening():
-            self.simulations.begin(seed, simulation, demand)
+            self.simulations.begin(seed, demand)
             if note:
                 self._departures = self._notes(demand, states)
             self._insert(states, starts)
@@ -164,12 +158,6 @@ class World:
         """How many calls have led here from the beginning of the episode."""
         return len(self._calls)
 
-    @property
-    def repeatable(self) -> bool:
-        """Whether the simulation belongs to this episode alone, so that its past is known."""
-        (_, (*_, simulation, _, _)), *_ = self._calls
-        return bool(simulation == "own")
-
     def again(self, told: int) -> Snapshot | None:
         """Bring a new simulation to an earlier moment of the episode, by telling it the same.
 
@@ -178,7 +166,6 @@ class World:
 
         Returns the last snapshot of then, with the same bits if SUMO does the same again.
         """
-        assert self.repeatable
         self._calls = self._calls[:told]
         snapshot: Snapshot | None = None
         for name, arguments in tuple(self._calls):
@@ -457,6 +444,6 @@ def _route_of(start: Start) -> str:
     if start.approach is None:
         return "cavsumo_tester"
     name = " ".join(("cavsumo", *start.approach.edges))
-    if name not in libsumo.route.getIDList():  # a shared simulation has it already
+    if name not in libsumo.route.getIDList():  # another tester's
         libsumo.route.add(name, list(start.approach.edges))
     return name

@@ -231,13 +231,6 @@ def test_replays(play: Play, capsys: pytest.CaptureFixture[str]) -> None:
     assert numbers(capsys.readouterr().out.splitlines()[-2]) == [1, 1, 0]
 
 
-def test_shared(play: Play) -> None:
-    """A block of two episodes."""
-    said = play("shared", "--blocks", "1", "--net", NET, SHARED_BY=2)
-    assert "2 episodes" in said.splitlines()[0]
-    assert "tests found" in said.splitlines()[-1]
-
-
 def test_ssm(play: Play) -> None:
     """It has no size: all encounters."""
     assert len(play("ssm").splitlines()) > 3

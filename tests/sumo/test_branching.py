@@ -7,7 +7,7 @@ import os
 import random
 import re
 import signal
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -287,16 +287,3 @@ def test_another_libsumo_refuses_a_seed(begin: Begin, monkeypatch: pytest.Monkey
     with pytest.raises(BranchError, match="branch without a seed"):
         branch(loop, Continuation(seed=1))
     assert branch(loop, Continuation(steps=2)).steps == STEPS + 2
-
-
-def test_a_shared_simulation_is_branched_only_by_a_fork(
-    set_up: Callable[..., PreparedBatch],
-) -> None:
-    """Of its past only a fork knows."""
-    with EpisodeRunner(set_up("pedestrians", reset="shared")) as runner:
-        own = job(runner.plan, 0)
-        agents: Sequence[Agent] = runner.agents_of(own)
-        loop = EpisodeLoop(runner.setup, agents, own.seed, simulation="new")
-        assert branch(loop, Continuation(steps=2)).steps == 2
-        with pytest.raises(BranchError, match="by a fork alone"):
-            branch(loop, Continuation(steps=2), fork=False)

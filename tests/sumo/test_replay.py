@@ -462,7 +462,7 @@ def test_an_episode_of_a_shared_simulation_is_not_replayed_alone(
     file = _sent(recording, tmp_path)
     text = file.read_text(encoding="utf-8").replace('"reset": "fresh"', '"reset": "shared"')
     file.write_text(text, encoding="utf-8")
-    with pytest.raises(ResultsError, match="other episodes used before"):
+    with pytest.raises(ResultsError, match="other episodes had used before"):
         recorded_alone(file)
 
 

@@ -15,9 +15,7 @@ from cavsumo.model.scenario.parsing import (
 )
 from cavsumo.model.scenario.plan import (
     NO_REFERENCE,
-    SHARED_BY,
     BatchPlan,
-    Simulation,
     half_width,
     part_of,
 )
@@ -28,11 +26,9 @@ __all__ = [
     "PLAN_KEYS",
     "SCENARIO_KEYS",
     "SENSOR_KEYS",
-    "SHARED_BY",
     "BatchPlan",
     "Params",
     "Scenario",
-    "Simulation",
     "check_keys",
     "half_width",
     "part_of",

@@ -12,6 +12,7 @@ from cavsumo.errors import InputError, UnknownName, shown
 from cavsumo.model.documents import first_problem
 from cavsumo.model.named_networks import check_network, is_named, routes_of
 from cavsumo.model.scenario.fields import settings as offered
+from cavsumo.model.scenario.gone import GONE
 from cavsumo.model.scenario.plan import BatchPlan
 from cavsumo.model.scenario.record import Scenario
 from cavsumo.model.scenario.sensor import Sensor
@@ -78,6 +79,8 @@ def _check_together(plan: BatchPlan, source: str) -> None:
 def check_keys(settings: Mapping[str, Any], source: str) -> None:
     """Refuse keys that no setting has."""
     for key in settings:
+        if key in GONE:
+            raise InputError(f"{source}: {key}: {GONE[key].words}")
         if key not in SCENARIO_KEYS | PLAN_KEYS:
             raise UnknownName("key", key, SCENARIO_KEYS | PLAN_KEYS, source)
     for sensor in SENSOR_KEYS:
