@@ -51,6 +51,7 @@ class BatchRun:
     left_out: list[Path] = field(default_factory=list)
 
     def __post_init__(self) -> None:
+        self._noted = False
         self._watch = OutputWatch(self.prepared.plan.scenario.ego, self.prepared.checksums)
 
     def begin(self, manifest: Mapping[str, Any], *, overwrite: bool = False) -> None:
@@ -79,7 +80,7 @@ class BatchRun:
         rule = stopping_rule(self.prepared.plan)
         reason = rule(self.tally)
         with Progress(self.prepared.plan.size, self.quiet, self.tally.rows) as progress:
-            for answer in self._answers(self._todo) if reason is None else ():
+            for answer in self._answers(self._todo, progress) if reason is None else ():
                 row = self.recorder.write(answer.outcome)
                 self.tally.add(row)
                 learned = self._knowledge.learned(row, answer.memory) and self._knowledge.due
@@ -104,7 +105,7 @@ class BatchRun:
         self._knowledge.forget(relearning)
         replaced: dict[int, Outcome] = {}
         with Progress(len(todo), self.quiet) as progress:
-            for answer in self._answers(todo):
+            for answer in self._answers(todo, progress):
                 row = answer.outcome.row
                 self._knowledge.learned(row, answer.memory)
                 replaced[row["run"]] = answer.outcome
@@ -134,16 +135,20 @@ class BatchRun:
         noted["sha256"] = {k: v for k, v in noted["sha256"].items() if k not in found}
         return True
 
-    def _answers(self, todo: Iterable[int]) -> Iterator[Answer]:
-        """Play episodes by the executor."""
-        return run_batch(
+    def _answers(self, todo: Iterable[int], progress: Progress) -> Iterator[Answer]:
+        """Play episodes by the executor; what its processes note is said once."""
+        for answer in run_batch(
             self.prepared,
             self.executor,
             todo,
             memories=self._knowledge.memories,
             ahead=LOOK_AHEAD * self.jobs,
             stopped=self.stopped,
-        )
+        ):
+            if answer.note and not self._noted:
+                self._noted = True
+                progress.say(f"cavsumo: SUMO is started for every episode: {answer.note}")
+            yield answer
 
 
 def _to_retry(csv_file: Path, learners: frozenset[str]) -> tuple[list[int], frozenset[str]]:

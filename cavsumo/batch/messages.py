@@ -38,10 +38,13 @@ class Answer:
     Attributes:
         outcome: its row, trace and log.
         memory: the knowledge of its agents afterwards; None if none of them learns.
+        note: why SUMO is started for every episode although the network is large; empty if it is
+            not, or if that was said before.
     """
 
     outcome: Outcome
     memory: Memory | None = None
+    note: str = ""
 
 
 @dataclass(frozen=True)

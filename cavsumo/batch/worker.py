@@ -26,7 +26,7 @@ from cavsumo.batch.prepared import PreparedBatch
 from cavsumo.errors import BatchError, InputError
 from cavsumo.model.offspring import kill_descendants
 from cavsumo.model.own_folders import OwnFolder, sweep_once
-from cavsumo.model.processes import by_a_lasting_thread, ending, inner_environment
+from cavsumo.model.processes import by_a_lasting_thread, ending, inner_environment, last_words
 
 STARTUP_S = 120.0  # imports, SUMO's first start and that of the ego, on a slow machine
 STUCK_S = 20  # longest interruption of a message
@@ -185,7 +185,7 @@ class Worker:
         except BlockingIOError:  # it began to answer
             raise _ProcessGone(f"stuck in its answer for {STUCK_S} s, killed") from None
         except (EOFError, OSError):
-            raise _ProcessGone(self._end() + self._last_words()) from None
+            raise _ProcessGone(self._end() + last_words(self._log.fileno())) from None
         raise _ProcessGone(f"no answer within {deadline:g} s, killed")
 
     def _end(self) -> str:
@@ -196,13 +196,6 @@ class Worker:
         except subprocess.TimeoutExpired:
             return "the simulation process closed its pipe, killed"
         return f"the simulation process {ending(code)}"
-
-    def _last_words(self) -> str:
-        """The last line that the process printed below Python."""
-        self._log.seek(0)
-        text = self._log.read().decode("utf-8", errors="replace")
-        lines = [line.strip() for line in text.splitlines() if line.strip()]
-        return f" ({lines[-1]})" if lines else ""
 
     def _dismiss(self) -> None:
         """Let a process that waits for a job, and its ego, end by themselves."""

@@ -57,7 +57,7 @@ class Checkpoint:
             return check(episode, loop).judged(reference)
 
         try:
-            self._fork = Fork(judges, 2 * deadline, keep=source)
+            self._fork = Fork(judges, 2 * deadline, keep=[source])
         finally:
             os.close(source)
 
@@ -103,6 +103,7 @@ def begun(
     spent = time.process_time() - before
     if check is None or setup.ego.outside or not can_fork():
         return loop, None
-    if spent < QUICK_S or spent < WORTH * cost_of_fork():
+    slow = setup.world.simulations.stood_by  # another one would be started
+    if not slow and (spent < QUICK_S or spent < WORTH * cost_of_fork()):
         return loop, None
     return loop, Checkpoint(loop, check, deadline)

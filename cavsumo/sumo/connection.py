@@ -1,4 +1,7 @@
-"""SUMO's simulation, one for each episode.
+"""SUMO's simulation, one for each episode: started for it, or begun in one that stands by.
+
+A simulation that stands by has been started, and nothing else. In forks of its process it becomes
+the simulations of many episodes, with the same bits as if each had been started.
 
 It calls SUMO through given functions, so that ``world`` stays the one boundary.
 """
@@ -14,9 +17,14 @@ from cavsumo.errors import SimulationError
 from cavsumo.model.departures import Attributes, Demand
 from cavsumo.model.scenario import Scenario
 from cavsumo.network.site import Site
+from cavsumo.sumo.late_routes import LateRoutes, refusal
+from cavsumo.sumo.native import Library
 from cavsumo.sumo.options import OPTIONS
 from cavsumo.sumo.recorded_demand import route_file, types_told
+from cavsumo.sumo.reseeding import reseed
 from cavsumo.sumo.vehicle_types import type_file
+
+STANDING_BY_SEED = 1  # of no episode: all generators are seeded anew
 
 
 class Simulations:
@@ -28,20 +36,39 @@ class Simulations:
 
     Attributes:
         routes: the file of the background demand, None for empty roads.
+        stood_by: whether the present one had stood by, so that another start costs much more.
     """
 
     def __init__(self, sumo: Any, scenario: Scenario, site: Site, ego: Ego, folder: Path) -> None:
         self._sumo, self._scenario, self._site = sumo, scenario, site
         self._types = folder / "types.add.xml"
         self._types.write_text(type_file(scenario, ego), encoding="utf-8")
+        self._stands_by = self.stood_by = False
+        self._late: LateRoutes | None = None
         self._recorded = folder / "recorded.rou.xml"  # departures that are played back
         self._net, self.routes = scenario.net_file, scenario.routes_file
         if site.demand is not None:
             self.routes = folder / "traffic.rou.xml"
             self.routes.write_text(site.demand, encoding="utf-8")
 
+    def stand_by(self) -> None:
+        """Start SUMO for the next episode, before its seed is known."""
+        self._sumo.close()
+        self._sumo.start(self.command(STANDING_BY_SEED, None))
+        # SUMO makes tables of all walking areas and of all edges when they are first asked for.
+        self._sumo.person.getIDList()
+        self._sumo.simulation.convertRoad(0.0, 0.0)
+        self._stands_by = True
+
+    @cached_property
+    def stand_by_refusal(self) -> str:
+        """The reason why no simulation can stand by, as a clause; empty if one can."""
+        if not Library(self._sumo).complete:
+            return "this build of libsumo cannot seed a running simulation"
+        return refusal(self.routes, self._scenario.additional_files)
+
     def begin(self, seed: int, demand: Demand | None = None) -> None:
-        """Start SUMO (``World.reset``).
+        """Start SUMO, unless it stands by (``World.reset``).
 
         ``demand``: recorded departures in place of the scenario's demand.
         """
@@ -49,8 +76,14 @@ class Simulations:
         if demand is not None:
             routes = self._recorded
             routes.write_text(route_file(demand), encoding="utf-8")
-        self._sumo.close()
-        self._sumo.start(self.command(seed, routes))
+        self.stood_by, self._stands_by, self._late = self._stands_by, False, None
+        if self.stood_by:
+            reseed(self._sumo, seed)
+            if routes is not None:
+                self._late = LateRoutes(self._sumo, routes)
+        else:
+            self._sumo.close()
+            self._sumo.start(self.command(seed, routes))
         self.set_light()
         route = self._site.route
         self._sumo.route.add("cavsumo_ego", list(route.edges))
@@ -58,6 +91,8 @@ class Simulations:
 
     def advance(self) -> None:
         """One timestep of SUMO."""
+        if self._late is not None:
+            self._late.read()
         self._sumo.simulationStep()
 
     def set_light(self) -> None:
@@ -80,7 +115,7 @@ class Simulations:
         return types_told(self.routes, self._scenario.additional_files)
 
     def command(self, seed: int, routes: Path | None) -> list[str]:
-        """The command line of SUMO."""
+        """The command line of SUMO; ``routes``: the route file, None for none."""
         scenario = self._scenario
         more = [*scenario.additional_files, self._types]
         files = ["-n", str(self._net), "-a", ",".join(str(f) for f in more)]

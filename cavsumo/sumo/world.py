@@ -12,9 +12,9 @@ from __future__ import annotations
 import math
 import os
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
 from pathlib import Path
-from tempfile import TemporaryDirectory
+from tempfile import TemporaryDirectory, TemporaryFile
 from typing import Any
 
 import libsumo
@@ -69,7 +69,6 @@ class World:
         self._persons = scenario.embodiment == "person"
         self._folder = TemporaryDirectory(prefix="cavsumo-")
         folder = Path(self._folder.name)
-        self._heard = (folder / "stderr.log").open("ab")
         self.simulations = Simulations(libsumo, scenario, site, ego, folder)
         self._roaming: Roaming | None = None
         self.begun = 0
@@ -91,7 +90,6 @@ class World:
         if _PLAYING[0] in (None, self._mark):
             libsumo.close()
             _PLAYING[0] = None
-        self._heard.close()
         self._folder.cleanup()
 
     def reset(
@@ -152,6 +150,17 @@ class World:
         self._everything = everything
         self._background = self._lookout(everything, (ego, *states))
         return self._snapshot(ego, tuple(states))
+
+    def stand_by(self) -> None:
+        """Start SUMO for the next episode before its seed is known; see ``connection``."""
+        _PLAYING[0] = self._mark
+        with self._listening():
+            self.simulations.stand_by()
+
+    @property
+    def lanes(self) -> int:
+        """How many lanes the network has in SUMO, junctions included."""
+        return int(libsumo.lane.getIDCount())
 
     @property
     def told(self) -> int:
@@ -245,20 +254,20 @@ class World:
     @contextmanager
     def _listening(self) -> Iterator[None]:
         """Turn SUMO's refusals into SimulationError with the message that it prints on stderr."""
-        with suppress(OSError):  # in a fork it leads nowhere
-            self._heard.truncate(0)
         stderr = os.dup(2)
-        os.dup2(self._heard.fileno(), 2)
-        try:
-            yield
-        except (libsumo.TraCIException, libsumo.FatalTraCIError) as error:
-            words = Path(self._heard.name).read_text(errors="replace") or str(error)
-            lines = [" ".join(line.split()) for line in words.splitlines()]
-            said = [line for line in lines if line and not line.startswith("Quitting")]
-            raise SimulationError("SUMO: " + " ".join(dict.fromkeys(said[:4]))) from error
-        finally:
-            os.dup2(stderr, 2)
-            os.close(stderr)
+        with TemporaryFile() as heard:
+            os.dup2(heard.fileno(), 2)
+            try:
+                yield
+            except (libsumo.TraCIException, libsumo.FatalTraCIError) as error:
+                heard.seek(0)
+                words = heard.read().decode(errors="replace") or str(error)
+                lines = [" ".join(line.split()) for line in words.splitlines()]
+                said = [line for line in lines if line and not line.startswith("Quitting")]
+                raise SimulationError("SUMO: " + " ".join(dict.fromkeys(said[:4]))) from error
+            finally:
+                os.dup2(stderr, 2)
+                os.close(stderr)
 
     # Bodies in SUMO
 

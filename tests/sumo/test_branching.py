@@ -25,7 +25,7 @@ from cavsumo.model.snapshot import Snapshot
 from cavsumo.simulation.branching import Continuation, branch, branches
 from cavsumo.simulation.loop import Episode, EpisodeLoop
 from cavsumo.simulation.playback import played_back, recorded
-from cavsumo.sumo import reseeding
+from cavsumo.sumo import native
 
 Begin = Callable[..., EpisodeLoop]
 STEPS = 25  # of the episode before it is branched
@@ -282,7 +282,7 @@ def test_an_ego_that_steers_itself_is_not_handed_to_one_that_does_not(begin: Beg
 
 def test_another_libsumo_refuses_a_seed(begin: Begin, monkeypatch: pytest.MonkeyPatch) -> None:
     """Where its functions have other names; without a seed it branches."""
-    monkeypatch.setattr(reseeding, "SEED_ALL", "other")
+    monkeypatch.setattr(native, "SEED_ALL", "other")
     loop = begin("pedestrians")
     with pytest.raises(BranchError, match="branch without a seed"):
         branch(loop, Continuation(seed=1))
