@@ -55,9 +55,7 @@ def main() -> None:
     options = parser.parse_args()
     with tempfile.TemporaryDirectory() as folder:
         nets = options.net or [*NETS, grid(Path(folder))]
-        good = [
-            compared(net, name, options.episodes) for net in nets for name in SETTINGS
-        ]
+        good = [compared(net, name, options.episodes) for net in nets for name in SETTINGS]
         leftovers(nets[-1], options.many)
     sys.exit(0 if all(good) else 1)
 
@@ -100,7 +98,7 @@ def compared(net: str, name: str, episodes: int) -> bool:
                 times.append(processor_time() - before)
             if large:
                 world = server._runner.setup.world
-                start = statistics.median(timed(lambda: world.stand_by()) for _ in range(STARTS))
+                start = statistics.median(timed(world.stand_by) for _ in range(STARTS))
             answers.append(found)
             spent.append(times[2:])  # the first is played here, the second pays for the start
     same = sum(episode_server._same(a, b) for a, b in zip(*answers, strict=True))

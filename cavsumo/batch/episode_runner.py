@@ -61,8 +61,14 @@ class EpisodeRunner:
             self._team(member.label)[0][0].prepare()
         self.setup.world.reset(episode_seed(self.plan.seed, 0), (), ())
 
-    def play(self, job: Job, beat: Callable[[], None] = lambda: None) -> Answer:
-        """Play a job; ``beat`` is called when another simulation begins for it."""
+    def play(
+        self, job: Job, beat: Callable[[], None] = lambda: None, *, judge: bool = True
+    ) -> Answer:
+        """Play a job; ``beat`` is called when another simulation begins for it.
+
+        ``judge``: judge a failure; else nothing is prepared for that, and a failure that would have
+        to be judged is an answer without a trace that says so.
+        """
         since = time.perf_counter()
         log, checkpoint = "", None
         try:
@@ -79,15 +85,18 @@ class EpisodeRunner:
             if job.recorded is not None:
                 episode = played_back(self.setup, job.recorded)
             else:
-                asked, deadline = check if retry else None, self.plan.deadline_s / 2
+                asked = check if retry and judge else None
+                deadline = self.plan.deadline_s / 2
                 loop, checkpoint = begun(
                     self.setup, agents, job.seed, asked, deadline, record=record, keep=retry
                 )
                 episode = played_on(loop)
             memory = _recall(agents)
             log = self.setup.ego.take_log()
-            avoidability = None
-            if retry and episode.outcome == VIOLATED:
+            avoidability, judged = None, True
+            if not judge and retry and episode.outcome == VIOLATED:
+                record = judged = False
+            elif retry and episode.outcome == VIOLATED:
                 reference = REFERENCES.make(self.plan.reference, {})
                 if checkpoint is not None:
                     beat()
@@ -98,13 +107,13 @@ class EpisodeRunner:
         except Exception as error:  # any error costs this row and no other
             said = str(error) if isinstance(error, CavsumoError) else f"defect: {error!r}"
             row, trace = row_of(finished(self.plan, job, error=said)), ""
-            memory = job.memory
+            memory, judged = job.memory, True
         finally:
             if checkpoint is not None:
                 checkpoint.close()
         row["wall_s"] = time.perf_counter() - since
         said_later = self.setup.ego.take_log()  # of an episode that failed; a rerun's is not kept
-        return Answer(Outcome(row, trace, log or said_later), memory)
+        return Answer(Outcome(row, trace, log or said_later), memory, judged)
 
     def _team(self, label: str) -> tuple[list[Agent], Memory | None]:
         """The agents of a label, and their knowledge when they were built; fresh copies of an agent

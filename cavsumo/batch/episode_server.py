@@ -114,10 +114,18 @@ class EpisodeServer:
             gc.freeze()  # so that a fork's collections leave the pages shared
 
     def _forked(self, job: Job, beat: Beat, *, shown: bool = True) -> Answer:
-        """The answer of a job that is played in a fork.
+        """The answer of a job that is played in a fork, and a failure in another one.
+
+        To judge a failure takes the episode at its start once more, for which a second fork is kept
+        waiting (``checkpoints``); that would cost most episodes more than it saves the others.
 
         ``shown``: whether what the users' code prints is printed.
         """
+        answer = self._in_fork(job, beat, judge=False, shown=shown)
+        return answer if answer.judged else self._in_fork(job, beat, judge=True, shown=False)
+
+    def _in_fork(self, job: Job, beat: Beat, *, judge: bool, shown: bool) -> Answer:
+        """The answer of one fork."""
         begun = time.perf_counter()
         source, sink = os.pipe()
         try:
@@ -125,7 +133,7 @@ class EpisodeServer:
             self._stand_by()
             os.ftruncate(self._log, 0)
             os.lseek(self._log, 0, os.SEEK_SET)
-            work = partial(_played, self._runner, job, sink, self._deadline)
+            work = partial(_played, self._runner, job, sink, self._deadline, judge)
             fork = Fork(work, self._deadline, [sink, *[self._stderr] * shown])
         except (BranchError, SimulationError):  # no process; or SUMO would not start
             os.close(source)
@@ -174,14 +182,14 @@ class EpisodeServer:
         return f"no answer within {self._deadline:g} s, killed"
 
 
-def _played(runner: EpisodeRunner, job: Job, sink: int, deadline: float) -> Answer:
+def _played(runner: EpisodeRunner, job: Job, sink: int, deadline: float, judge: bool) -> Answer:
     """The answer of a job, in a fork, which says when another simulation begins."""
 
     def beat() -> None:
         signal.setitimer(signal.ITIMER_REAL, deadline + ALARM_AFTER_S)
         os.write(sink, b".")
 
-    return runner.play(job, beat)
+    return runner.play(job, beat, judge=judge)
 
 
 def _same(first: Answer, second: Answer) -> bool:

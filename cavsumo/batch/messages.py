@@ -38,12 +38,14 @@ class Answer:
     Attributes:
         outcome: its row, trace and log.
         memory: the knowledge of its agents afterwards; None if none of them learns.
+        judged: False for a failure that has yet to be judged (``EpisodeRunner.play``).
         note: why SUMO is started for every episode although the network is large; empty if it is
             not, or if that was said before.
     """
 
     outcome: Outcome
     memory: Memory | None = None
+    judged: bool = True
     note: str = ""
 
 

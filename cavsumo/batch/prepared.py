@@ -26,7 +26,8 @@ from cavsumo.errors import InputError
 from cavsumo.model.bodies import WALKING, Kind, kind_named
 from cavsumo.model.objects import SentObject, objects_among
 from cavsumo.model.scenario import BatchPlan, Scenario
-from cavsumo.network.site import Site, Wishes, derive_site
+from cavsumo.network.site import Site, Wishes
+from cavsumo.network.site_cache import site_of
 from cavsumo.network.traffic import Volume
 from cavsumo.network.traffic_lights import Pace
 from cavsumo.results.present import input_files
@@ -135,7 +136,7 @@ def prepare(plan: BatchPlan, ego: Ego | None = None) -> PreparedBatch:
             "needs a controller, such as time-gap"
         )
     asked = wishes(plan, kind, ego, {member.manoeuvre for member in cast})
-    site = derive_site(scenario.net_file, scenario.ego_route, scenario.junction, ego.kind, asked)
+    site = site_of(scenario.net_file, scenario.ego_route, scenario.junction, ego.kind, asked)
     if scenario.embodiment == "person" and not all(area.walk for area in site.areas):
         raise InputError("jaywalk: embodiment person needs a pavement near by, and there is none")
     if site.approaches:  # missing room must be found before the first episode
