@@ -3,8 +3,9 @@
     python benchmarks/episode_server.py [--net FILE]... [--episodes N] [--many N]
 
 On each network and in each setting the same episodes are played in both ways, in turns: rows and
-traces are compared, and processor time is printed for both, with that of a start of SUMO. The
-last line tells what many episodes leave behind. Without ``--net`` the shipped networks and a grid
+traces are compared, and processor time is printed for both, with that of a start of SUMO. Then
+episodes on the first and on the last network are compared as users run them, and what many episodes
+leave behind. Without ``--net`` the shipped networks and a grid
 of about 2,000 edges with pavements and crossings, which netgenerate makes (``pip install
 eclipse-sumo``).
 """
@@ -12,6 +13,7 @@ eclipse-sumo``).
 from __future__ import annotations
 
 import argparse
+import contextlib
 import os
 import resource
 import statistics
@@ -31,6 +33,7 @@ from cavsumo.batch.episode_server import EpisodeServer
 from cavsumo.batch.jobs import job
 from cavsumo.batch.messages import Answer
 from cavsumo.batch.prepared import prepare
+from cavsumo.batch.worker import Worker
 from cavsumo.model.fork_child import places
 from cavsumo.model.scenario import plan_from
 
@@ -51,11 +54,13 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--net", action="append", help="a network; may be given more than once")
     parser.add_argument("--episodes", type=int, default=10, help="of each setting")
+    parser.add_argument("--relative", type=int, default=100, help="of which the cost is compared")
     parser.add_argument("--many", type=int, default=2000, help="episodes of which nothing may stay")
     options = parser.parse_args()
     with tempfile.TemporaryDirectory() as folder:
         nets = options.net or [*NETS, grid(Path(folder))]
         good = [compared(net, name, options.episodes) for net in nets for name in SETTINGS]
+        relative([nets[0], nets[-1]], options.relative)
         leftovers(nets[-1], options.many)
     sys.exit(0 if all(good) else 1)
 
@@ -111,6 +116,32 @@ def compared(net: str, name: str, episodes: int) -> bool:
         flush=True,
     )
     return same == episodes + 2 and not notes
+
+
+def relative(nets: list[str], episodes: int) -> None:
+    """Print what episodes cost on networks, as users run them, in turns; the first is 1."""
+    spent: dict[str, list[float]] = {net: [] for net in nets}
+    with contextlib.ExitStack() as stack:
+        workers = {}
+        for net in nets:
+            plan = plan_from({"net": net, "runs": episodes + 2}, "benchmark")
+            workers[net] = stack.enter_context(Worker(prepare(plan)))
+        for run in range(episodes + 2):
+            for net, worker in workers.items():
+                before = time_of(worker)
+                worker.play(job(worker.prepared.plan, run))
+                spent[net].append(time_of(worker) - before)
+    costs = {net: 1e3 * statistics.mean(times[2:]) for net, times in spent.items()}
+    for net, cost in costs.items():
+        print(f"{Path(net).stem[:24]:25}{cost:7.1f} ms an episode ({cost / costs[nets[0]]:.2f})")
+
+
+def time_of(worker: Worker) -> float:
+    """Processor time of a worker's process and its children that have ended [s]."""
+    assert worker._process is not None
+    stat = Path(f"/proc/{worker._process.pid}/stat").read_text(encoding="ascii")
+    ticks = stat.rpartition(")")[2].split()[11:15]
+    return sum(map(int, ticks)) / os.sysconf("SC_CLK_TCK")
 
 
 def processor_time() -> float:

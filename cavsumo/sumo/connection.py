@@ -60,6 +60,10 @@ class Simulations:
         self._sumo.simulation.convertRoad(0.0, 0.0)
         self._stands_by = True
 
+    def lose(self) -> None:
+        """Note that somebody else has started a simulation in this process meanwhile."""
+        self._stands_by = False
+
     @cached_property
     def stand_by_refusal(self) -> str:
         """The reason why no simulation can stand by, as a clause; empty if one can."""

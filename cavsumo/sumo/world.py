@@ -138,6 +138,8 @@ class World:
         self._commanded = False
         self._vehicles: tuple[str, ...] = ()
         self._departures: DepartureNotes | None = None
+        if _PLAYING[0] is not self._mark:
+            self.simulations.lose()
         _PLAYING[0] = self._mark
         with self._listening():
             self.simulations.begin(seed, demand)

@@ -56,6 +56,15 @@ def test_the_same_episodes(open_world: Opener, name: str, demand: dict[str, str]
         assert started[0] != started[1]
 
 
+def test_a_simulation_that_another_world_took_stands_by_no_more(open_world: Opener) -> None:
+    """Whose it was starts another one."""
+    with open_world("pedestrians") as world, open_world("crossing") as other:
+        expected = course(world, 3, stood_by=False)
+        world.stand_by()
+        other.reset(1, (), ())
+        assert course(world, 3, stood_by=False) == expected
+
+
 @pytest.mark.parametrize(
     "bodies", [FLOW.format(how=f'number="20" {DRAWN}'), WALKS.format(how='number="9"')]
 )
