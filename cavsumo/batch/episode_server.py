@@ -27,7 +27,7 @@ from cavsumo.batch.jobs import Job, failed
 from cavsumo.batch.messages import Answer
 from cavsumo.errors import BranchError, SimulationError
 from cavsumo.model.fork_child import ALARM_AFTER_S, CHUNK, places
-from cavsumo.model.forks import Fork, can_fork
+from cavsumo.model.forks import Fork, can_fork, cost_of_fork
 from cavsumo.model.offspring import children, kill_strays
 from cavsumo.model.processes import ending, last_words
 
@@ -110,6 +110,7 @@ class EpisodeServer:
             self._runner.setup.world.stand_by()
             self._stands_by = True
             self._children = frozenset(children(os.getpid()))
+            cost_of_fork()  # which forks would measure anew
             gc.collect()
             gc.freeze()  # so that a fork's collections leave the pages shared
 

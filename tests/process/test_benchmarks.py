@@ -231,6 +231,23 @@ def test_replays(play: Play, capsys: pytest.CaptureFixture[str]) -> None:
     assert numbers(capsys.readouterr().out.splitlines()[-2]) == [1, 1, 0]
 
 
+def test_episode_server(play: Play, capsys: pytest.CaptureFixture[str]) -> None:
+    """Three episodes of one setting."""
+    words = ["--net", NET, "--episodes", "1", "--relative", "1", "--many", "2"]
+    with pytest.raises(SystemExit) as ended:
+        play("episode_server", *words, SETTINGS={"defaults": {"end": 3.0}})
+    said = capsys.readouterr().out.splitlines()
+    assert not ended.value.code, said
+    assert "3 of 3 the same" in said[0]
+    assert said[1].endswith("(1.00)")
+    assert "before and after 2 episodes" in said[-1]
+
+
+def test_reading(play: Play) -> None:
+    """A small network, once."""
+    assert "1 site" in play("reading", "--net", NET, "--times", "1")
+
+
 def test_ssm(play: Play) -> None:
     """It has no size: all encounters."""
     assert len(play("ssm").splitlines()) > 3
