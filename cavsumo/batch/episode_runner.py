@@ -24,7 +24,8 @@ from cavsumo.results.trace_file import packed
 from cavsumo.results.traces import origin, trace_head, trace_text
 from cavsumo.simulation.avoidability import AvoidabilityCheck
 from cavsumo.simulation.checkpoints import begun
-from cavsumo.simulation.loop import Episode, EpisodeLoop, played_on
+from cavsumo.simulation.episode import Episode
+from cavsumo.simulation.loop import EpisodeLoop, played_on
 from cavsumo.simulation.playback import played_back, recorded
 from cavsumo.simulation.setup import make_setup
 

@@ -13,6 +13,7 @@ from typing import Any, NamedTuple
 import shapely
 from shapely.geometry import LineString, Point
 
+from cavsumo.model.cells import CellAnswer, Cells
 from cavsumo.model.polyline import Path
 
 REACH_M = 60.0  # how far a crossing line is followed; wider carriageways are not crossed
@@ -204,12 +205,32 @@ class Roads:
         shapely.prepare(self.carriageway)
         shapely.prepare(self._boundary)
         shapely.prepare(self.pavements)
+        self.on_carriageway = Cells(
+            self._contains, lambda x, y: CellAnswer(self._contains(x, y), self.edge_distance(x, y))
+        )
+        self._worlds: dict[tuple[float, bool], Cells] = {}
 
     def __reduce__(self) -> tuple[type[Roads], tuple[Any, ...]]:
         return Roads, (self.carriageway, self.lanes, list(self.pavements.geoms))
 
     def contains(self, x: float, y: float) -> bool:
         """Whether a point lies on the carriageway."""
+        return self.on_carriageway.at(x, y).holds
+
+    def within(self, reach: float, *, on_foot: bool) -> Cells:
+        """Whether points are within a reach [m] of a carriageway, ``on_foot`` or of a pavement."""
+        if (reach, on_foot) not in self._worlds:
+            far = self.walking_distance if on_foot else self.driving_distance
+
+            def found(x: float, y: float) -> CellAnswer:
+                room = reach - far(x, y)
+                return CellAnswer(room >= 0.0, abs(room))
+
+            self._worlds[reach, on_foot] = Cells(lambda x, y: far(x, y) <= reach, found)
+        return self._worlds[reach, on_foot]
+
+    def _contains(self, x: float, y: float) -> bool:
+        """Whether a point lies on the carriageway, computed."""
         return bool(shapely.contains_xy(self.carriageway, x, y))
 
     def edge_distance(self, x: float, y: float) -> float:
@@ -218,7 +239,7 @@ class Roads:
 
     def driving_distance(self, x: float, y: float) -> float:
         """Distance to the carriageway [m], 0 on it."""
-        return 0.0 if self.contains(x, y) else self.edge_distance(x, y)
+        return 0.0 if self._contains(x, y) else self.edge_distance(x, y)
 
     def walking_distance(self, x: float, y: float) -> float:
         """Distance to the nearest carriageway or axis of a pavement [m], 0 on a carriageway."""

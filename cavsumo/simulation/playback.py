@@ -13,7 +13,8 @@ from cavsumo.agents.recorded import Recorded, RecordedAgent
 from cavsumo.model.bodies import Action
 from cavsumo.model.departures import Demand
 from cavsumo.network.recorded_starts import start_record
-from cavsumo.simulation.loop import Episode, EpisodeLoop, Joint, played_on
+from cavsumo.simulation.episode import Episode, Joint
+from cavsumo.simulation.loop import EpisodeLoop, played_on
 from cavsumo.simulation.setup import Setup
 
 

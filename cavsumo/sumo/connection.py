@@ -14,6 +14,7 @@ from cavsumo.errors import SimulationError
 from cavsumo.model.departures import Attributes, Demand
 from cavsumo.model.scenario import Scenario, Simulation
 from cavsumo.network.site import Site
+from cavsumo.sumo.calls import direct
 from cavsumo.sumo.demand import BEYOND_S, Departures, Lights, cleared, noted, types_only
 from cavsumo.sumo.options import OPTIONS
 from cavsumo.sumo.recorded_demand import route_file, types_told
@@ -33,6 +34,7 @@ class Simulations:
 
     def __init__(self, sumo: Any, scenario: Scenario, site: Site, ego: Ego, folder: Path) -> None:
         self._sumo, self._scenario, self._site = sumo, scenario, site
+        self._step = direct(sumo.simulation, "step")
         self._types = folder / "types.add.xml"
         self._types.write_text(type_file(scenario, ego), encoding="utf-8")
         self._kept = folder / "kept.add.xml"  # what stays of the demand when we send it ourselves
@@ -74,7 +76,7 @@ class Simulations:
         """One timestep of SUMO."""
         if self._departures is not None:
             self._departures.send()
-        self._sumo.simulationStep()
+        self._step(0.0)
 
     def set_light(self) -> None:
         """Set the first traffic light on the ego's route to its required phase."""

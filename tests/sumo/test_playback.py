@@ -22,7 +22,8 @@ from cavsumo.model.departures import Demand
 from cavsumo.model.snapshot import Snapshot
 from cavsumo.network.recorded_starts import recorded_start
 from cavsumo.results.traces import Trace, trace_of
-from cavsumo.simulation.loop import Episode, play
+from cavsumo.simulation.episode import Episode
+from cavsumo.simulation.loop import play
 from cavsumo.simulation.playback import played_back, recorded
 from cavsumo.sumo.recorded_demand import route_file, types_told
 
