@@ -51,7 +51,7 @@ class Cells:
         return CellAnswer(found.holds, found.room - math.hypot(x - there_x, y - there_y))
 
     def _learn(self, cell: tuple[float, float]) -> tuple[float, float, CellAnswer] | None:
-        """What is known of a cell from now on."""
+        """Find out, and note, the answer in all of a cell; None along a boundary."""
         if len(self._known) >= MOST:
             self._known.clear()
         x, y = (SIDE_M * (number + 0.5) for number in cell)
