@@ -1,13 +1,15 @@
-"""CPU time of an episode: a bare libsumo loop, the simulator alone, and the whole command.
+"""CPU time of an episode: a bare libsumo loop, the simulator alone, a whole episode, the command.
 
     python benchmarks/speed.py [--other FOLDER] [--net NET] [--testers N] [--agent NAME]
-                               [--episodes N] [--rounds N]
+                               [--episodes N] [--rounds N] [--no-command]
 
 Another version of the repository, in another folder, is measured in the same run, in turns, against
-the bare loop of its own episodes. Each version plays in a process of its own. An episode is played
-in several rounds and the fastest one counts. The command is measured as users run it (``cavsumo
-run``, one process that simulates, defaults but for what is given here), all its processes together,
-less the same command with one episode.
+the bare loop of its own episodes (``throughput``). Each version plays in a process of its own, each
+episode in several rounds, of which the fastest counts. *Alone* is the loop of agents, SUMO and
+assertions; *whole* what the simulating process does for a row by default: the loop with everybody
+recorded, reruns with the reference driver, row and trace. *Command* is ``cavsumo run`` as users run
+it, all its processes together, less the same command with one episode; it needs many episodes, or
+the noise of two starts weighs more than they do.
 """
 
 from __future__ import annotations
@@ -28,7 +30,7 @@ from typing import Any
 
 ROOT = Path(__file__).resolve().parent.parent
 NETS = [str(ROOT / "networks" / f"{name}.net.xml") for name in ("crossing", "junction")]
-SHOWN = ("bare loop", "simulator alone", "whole command")
+SHOWN = ("alone", "whole", "command")
 
 
 @dataclass(frozen=True)
@@ -50,6 +52,7 @@ def main() -> None:
     parser.add_argument("--agent", default="timing")
     parser.add_argument("--episodes", type=int, default=60)
     parser.add_argument("--rounds", type=int, default=3)
+    parser.add_argument("--no-command", action="store_true", help="do not measure the command")
     parser.add_argument("--play", action="store_true", help=argparse.SUPPRESS)
     options = parser.parse_args()
     nets = options.net or NETS
@@ -58,24 +61,27 @@ def main() -> None:
         play(Measured(nets[0], testers[0], options.agent, options.episodes))
         return
     folders = [ROOT] + ([options.other.resolve()] if options.other else [])
-    print(f"{'ms an episode':34}{SHOWN[0]:>12}{SHOWN[1]:>24}{SHOWN[2]:>24}")
+    print(f"{'ms an episode, times bare':34}{'bare':>8}" + "".join(f"{name:>16}" for name in SHOWN))
     for net in nets:
         for number in testers:
             batch = Measured(net, number, options.agent, options.episodes)
-            for folder, spent in zip(folders, compare(batch, folders, options.rounds), strict=True):
+            found = compare(batch, folders, options.rounds, command=not options.no_command)
+            for folder, spent in zip(folders, found, strict=True):
                 show(batch, folder, spent)
 
 
 def show(batch: Measured, folder: Path, spent: list[float]) -> None:
     """Print a line: milliseconds, and as many times the bare loop."""
     name = f"{Path(batch.net).name.partition('.')[0]}, {batch.testers} testers, {folder.name}"
-    bare, alone, whole = spent
-    ratios = f"{alone:12.1f} (bare {bare / alone:.2f})" + f"{whole:13.1f} ({whole / bare:.2f} bare)"
-    print(f"{name:34}{bare:12.1f}{ratios}", flush=True)
+    bare, *others = spent
+    times = "".join(f"{ms:9.1f} ({ms / bare:.2f})" for ms in others)
+    print(f"{name:34}{bare:8.1f}{times}", flush=True)
 
 
-def compare(batch: Measured, folders: list[Path], rounds: int) -> list[list[float]]:
-    """Milliseconds of an episode in each version: bare, alone, whole; in turns."""
+def compare(
+    batch: Measured, folders: list[Path], rounds: int, *, command: bool
+) -> list[list[float]]:
+    """Milliseconds of an episode in each version: bare, alone, whole, command; in turns."""
     players = [Player(folder, batch) for folder in folders]
     alone: list[list[list[float]]] = [[] for _ in players]  # of each version and episode
     for run in range(batch.episodes):
@@ -84,12 +90,12 @@ def compare(batch: Measured, folders: list[Path], rounds: int) -> list[list[floa
             own.append([min(of) for of in zip(*times, strict=True)])
     for player in players:
         player.close()
-    commands = [[command_s(folder, batch) for folder in folders] for _ in range(rounds)]
-    whole = [min(times) / (batch.episodes - 1) for times in zip(*commands, strict=True)]
-    return [
-        [*(1e3 * sum(of) / batch.episodes for of in zip(*own, strict=True)), 1e3 * command]
-        for own, command in zip(alone, whole, strict=True)
-    ]
+    found = [[1e3 * sum(of) / batch.episodes for of in zip(*own, strict=True)] for own in alone]
+    if command:
+        taken_s = [[command_s(folder, batch) for folder in folders] for _ in range(rounds)]
+        for times, of in zip(found, zip(*taken_s, strict=True), strict=True):
+            times.append(1e3 * min(of) / (batch.episodes - 1))
+    return found
 
 
 class Player:
@@ -107,7 +113,7 @@ class Player:
         )
 
     def played(self, run: int) -> list[float]:
-        """Seconds of the bare loop and of the simulator alone."""
+        """Seconds of the bare loop, of the simulator alone and of a whole episode."""
         assert self._process.stdin is not None
         assert self._process.stdout is not None
         self._process.stdin.write(f"{run}\n")
@@ -125,20 +131,24 @@ def environment(folder: Path) -> dict[str, str]:
 
 
 def play(batch: Measured) -> None:
-    """Play the episodes that stdin names: the seconds of the bare loop and of the simulator."""
+    """Play the episodes that stdin names, in each way, and tell the seconds."""
     bare: Any = importlib.import_module("throughput")
     given = {"net": batch.net, "testers": batch.testers, "agents": (batch.agent,)}
     told, sys.stdout = sys.stdout, sys.stderr
     tracks: dict[str, Any] = {}
     with ExitStack() as stack:
-        world, seed_of, episode = opened(given, stack)
+        version = opened(given, stack)
         for run in sys.stdin:
-            seed = seed_of(int(run))
+            seed = version.job(int(run)).seed
             if run not in tracks:
-                frames = episode(int(run), record=True).frames
+                frames = version.alone(int(run), record=True).frames
                 tracks[run] = [[bare.to_bare(t) for t in s.testers] for s in frames]
-            took = seconds(partial(bare.bare_loop, world, seed, tracks[run]))
-            print(took, seconds(partial(episode, int(run))), file=told, flush=True)
+            calls = (
+                partial(bare.bare_loop, version.world, seed, tracks[run]),
+                partial(version.alone, int(run)),
+                partial(version.whole, version.job(int(run))),
+            )
+            print(*map(seconds, calls), file=told, flush=True)
 
 
 def seconds(call: Callable[[], Any]) -> float:
@@ -148,8 +158,25 @@ def seconds(call: Callable[[], Any]) -> float:
     return time.process_time() - begun
 
 
-def opened(given: dict[str, Any], stack: ExitStack) -> tuple[Any, Callable[..., int], Any]:
-    """The world of a batch, the seed of a run, and how an episode is played, in any version."""
+@dataclass(frozen=True)
+class Version:
+    """A batch set up in this process.
+
+    Attributes:
+        world: its world.
+        job: the job of a run.
+        alone: plays a run by the loop alone.
+        whole: plays a job to its row and its trace.
+    """
+
+    world: Any
+    job: Callable[[int], Any]
+    alone: Callable[..., Any]
+    whole: Callable[[Any], Any]
+
+
+def opened(given: dict[str, Any], stack: ExitStack) -> Version:
+    """A batch set up by the version that is imported here."""
     try:
         from cavsumo.batch.episode_runner import EpisodeRunner
         from cavsumo.batch.jobs import job
@@ -160,14 +187,14 @@ def opened(given: dict[str, Any], stack: ExitStack) -> tuple[Any, Callable[..., 
         return opened_01(given, stack)
     runner = stack.enter_context(EpisodeRunner(prepare(plan_from(given, "benchmark"))))
 
-    def episode(run: int, **how: Any) -> Any:
+    def alone(run: int, **how: Any) -> Any:
         one = job(runner.plan, run)
         return played(runner.setup, runner.agents_of(one), one.seed, **how)
 
-    return runner.setup.world, lambda run: job(runner.plan, run).seed, episode
+    return Version(runner.setup.world, partial(job, runner.plan), alone, runner.play)
 
 
-def opened_01(given: dict[str, Any], stack: ExitStack) -> tuple[Any, Callable[..., int], Any]:
+def opened_01(given: dict[str, Any], stack: ExitStack) -> Version:
     """The same in version 0.1, whose modules stood elsewhere."""
     names = ("jobs", "scenario", "setting", "simulator", "theatre")
     jobs, scenario, setting, simulator, theatre = (
@@ -176,11 +203,11 @@ def opened_01(given: dict[str, Any], stack: ExitStack) -> tuple[Any, Callable[..
     plan = scenario.plan_from(given, "benchmark")
     played = stack.enter_context(theatre.Theatre(plan, setting.prepare(plan).site))
 
-    def episode(run: int, **how: Any) -> Any:
+    def alone(run: int, **how: Any) -> Any:
         one = jobs.job(plan, run)
         return simulator.play(played.stage, played._cast(one), one.seed, **how)
 
-    return played.stage.world, lambda run: jobs.job(plan, run).seed, episode
+    return Version(played.stage.world, partial(jobs.job, plan), alone, played.play)
 
 
 def command_s(folder: Path, batch: Measured) -> float:

@@ -8,6 +8,7 @@ inside SUMO, where Python does not run.
 from __future__ import annotations
 
 import contextlib
+import gc
 import os
 import signal
 import sys
@@ -57,6 +58,8 @@ def _serve(pipe: Connection, first: Task) -> None:
         except (CavsumoError, OSError) as error:
             pipe.send(Reply("refused", str(error)))
             return
+        gc.collect()
+        gc.freeze()  # what is there now stays: it need not be looked through again and again
         pipe.send(Reply("ready"))
         _play(pipe, runner, prepared.plan.deadline_s)
 

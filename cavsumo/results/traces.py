@@ -132,10 +132,11 @@ def _bodies(snapshots: Iterable[Snapshot]) -> list[dict[str, Any]]:
     """All bodies in the order of appearance, those with the same box together."""
     met: dict[str, Body] = {}
     for snapshot in snapshots:
-        for body in (snapshot.ego.body, *(t.body for t in snapshot.testers)):
-            met.setdefault(body.id, body)
+        if not met:  # the ego and the testers are in all of them
+            met = {state.body.id: state.body for state in (snapshot.ego, *snapshot.testers)}
         for raw in snapshot.raw_background:
-            met.setdefault(raw[0].id, raw[0])
+            if raw[0].id not in met:
+                met[raw[0].id] = raw[0]
     alike: dict[Shape, list[str]] = {}
     for name, (_, kind) in met.items():
         shape = Shape(kind.name, kind.length, kind.width, kind.wheelbase)
