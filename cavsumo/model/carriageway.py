@@ -206,7 +206,7 @@ class Roads:
         shapely.prepare(self._boundary)
         shapely.prepare(self.pavements)
         self.on_carriageway = Cells(
-            self._contains, lambda x, y: CellAnswer(self._contains(x, y), self.edge_distance(x, y))
+            lambda x, y: CellAnswer(self.contains(x, y), self.edge_distance(x, y))
         )
         self._worlds: dict[tuple[float, bool], Cells] = {}
 
@@ -215,7 +215,7 @@ class Roads:
 
     def contains(self, x: float, y: float) -> bool:
         """Whether a point lies on the carriageway."""
-        return self.on_carriageway.at(x, y).holds
+        return bool(shapely.contains_xy(self.carriageway, x, y))
 
     def within(self, reach: float, *, on_foot: bool) -> Cells:
         """Whether points are within a reach [m] of a carriageway, ``on_foot`` or of a pavement."""
@@ -226,12 +226,8 @@ class Roads:
                 room = reach - far(x, y)
                 return CellAnswer(room >= 0.0, abs(room))
 
-            self._worlds[reach, on_foot] = Cells(lambda x, y: far(x, y) <= reach, found)
+            self._worlds[reach, on_foot] = Cells(found)
         return self._worlds[reach, on_foot]
-
-    def _contains(self, x: float, y: float) -> bool:
-        """Whether a point lies on the carriageway, computed."""
-        return bool(shapely.contains_xy(self.carriageway, x, y))
 
     def edge_distance(self, x: float, y: float) -> float:
         """Distance to the nearest edge of a carriageway [m]."""
@@ -239,7 +235,7 @@ class Roads:
 
     def driving_distance(self, x: float, y: float) -> float:
         """Distance to the carriageway [m], 0 on it."""
-        return 0.0 if self._contains(x, y) else self.edge_distance(x, y)
+        return 0.0 if self.contains(x, y) else self.edge_distance(x, y)
 
     def walking_distance(self, x: float, y: float) -> float:
         """Distance to the nearest carriageway or axis of a pavement [m], 0 on a carriageway."""

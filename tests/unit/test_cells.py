@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import math
-
 import pytest
 import shapely
 from hypothesis import given
@@ -46,22 +44,20 @@ def test_a_reach_is_measured_from_carriageway_or_pavement(
         assert room <= abs(far - 1.0)
 
 
-def test_a_cell_is_asked_for_once_and_a_boundary_every_time(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    """The half-plane x > 0; what is remembered is bounded."""
+def test_an_answer_is_remembered_as_far_as_it_reaches(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The half-plane x > 0, one cell after the other; what is remembered is bounded."""
     asked: list[float] = []
 
-    def holds(x: float, y: float) -> bool:
+    def computed(x: float, y: float) -> CellAnswer:
         asked.append(x)
-        return x > 0.0
+        return CellAnswer(x > 0.0, abs(x))
 
-    half = Cells(holds, lambda x, y: CellAnswer(holds(x, y), abs(x)))
-    for x in (3.01, 3.2, 3.49):
-        assert half.at(x, 0.1) == (True, pytest.approx(3.25 - math.hypot(x - 3.25, 0.15), abs=1e-5))
-    assert asked == [3.25]
-    assert [half.at(x, 0.0).holds for x in (0.1, 0.2, -0.1)] == [True, True, False]
-    assert asked == [3.25, 0.25, 0.1, 0.2, -0.25, -0.1]
+    half = Cells(computed)
+    assert half.at(3.1, 0.1) == (True, 3.1)
+    assert half.at(3.4, 0.1) == (True, pytest.approx(3.1 - 0.3, abs=1e-5))
+    assert half.at(3.6, 0.1) == (True, 3.6)
+    assert [half.at(x, 0.0).holds for x in (0.1, 0.15, 0.45, 0.1, -0.1)] == [True] * 4 + [False]
+    assert asked == [3.1, 3.6, 0.1, 0.45, -0.1]
     monkeypatch.setattr(cells, "MOST", 2)
     for i in range(9):
         half.at(5.0 + i, 0.0)
