@@ -37,7 +37,8 @@ from cavsumo.model.forks import can_fork, cost_of_fork, result_of
 from cavsumo.model.scenario import plan_from
 from cavsumo.simulation import avoidability, checkpoints
 from cavsumo.simulation.branching import Continuation, branch, branches
-from cavsumo.simulation.loop import Episode, EpisodeLoop, played_on
+from cavsumo.simulation.episode import Episode
+from cavsumo.simulation.loop import EpisodeLoop, played_on
 
 NETS = ("crossing", "junction", "pedestrians")
 AT = (5, 25, 60)  # timesteps in which episodes are branched

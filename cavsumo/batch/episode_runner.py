@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import itertools
 import time
 from collections.abc import Callable, Sequence
 from functools import cached_property
@@ -18,11 +17,14 @@ from cavsumo.errors import CavsumoError, EgoError
 from cavsumo.model.objects import is_instance
 from cavsumo.model.seeds import episode_seed
 from cavsumo.results.columns import Row, row_of
+from cavsumo.results.frame_text import frame_lines
 from cavsumo.results.rows import Outcome
-from cavsumo.results.traces import frame, origin, trace_head, trace_text
+from cavsumo.results.trace_file import packed
+from cavsumo.results.traces import origin, trace_head, trace_text
 from cavsumo.simulation.avoidability import AvoidabilityCheck
 from cavsumo.simulation.checkpoints import begun
-from cavsumo.simulation.loop import Episode, EpisodeLoop, played_on
+from cavsumo.simulation.episode import Episode
+from cavsumo.simulation.loop import EpisodeLoop, played_on
 from cavsumo.simulation.playback import played_back, recorded
 from cavsumo.simulation.setup import make_setup
 
@@ -103,10 +105,10 @@ class EpisodeRunner:
                     avoidability = checkpoint.judged(episode, reference)
                 avoidability = avoidability or check(episode).judged(reference)
             row = row_of(finished(self.plan, job, episode, avoidability))
-            trace = self._trace(job, row, before, episode) if record else ""
+            trace = self._trace(job, row, before, episode) if record else b""
         except Exception as error:  # any error costs this row and no other
             said = str(error) if isinstance(error, CavsumoError) else f"defect: {error!r}"
-            row, trace = row_of(finished(self.plan, job, error=said)), ""
+            row, trace = row_of(finished(self.plan, job, error=said)), b""
             memory, judged = job.memory, True
         finally:
             if checkpoint is not None:
@@ -133,14 +135,13 @@ class EpisodeRunner:
             agent.remember(memory)
         return agents
 
-    def _trace(self, job: Job, row: Row, memory: Any, episode: Episode) -> str:
-        """The frames worth keeping: of tests found, or of every episode if asked."""
+    def _trace(self, job: Job, row: Row, memory: Any, episode: Episode) -> bytes:
+        """The trace, if it is worth keeping: of tests found, or of every episode if asked."""
         if not (episode.frames and (job.record or episode.judgement.triggered)):
-            return ""
+            return b""
         played = recorded(self.setup, episode, job.seed, episode.departures)
         first = trace_head(self._origin, row, memory, episode.frames, played)
-        frames = itertools.zip_longest(episode.frames, played.actions, fillvalue=())
-        return trace_text(first, itertools.starmap(frame, frames))
+        return packed(trace_text(first, frame_lines(episode.frames, played.actions)))
 
 
 def _recall(agents: Sequence[Agent]) -> Memory | None:

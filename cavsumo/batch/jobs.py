@@ -18,7 +18,7 @@ from cavsumo.results.rows import Outcome
 
 if TYPE_CHECKING:
     from cavsumo.simulation.avoidability import Avoidability
-    from cavsumo.simulation.loop import Episode
+    from cavsumo.simulation.episode import Episode
 
 Memory = tuple[Any, ...]  # the knowledge of an episode's agents, as plain data, agent by agent
 

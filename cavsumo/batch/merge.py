@@ -18,6 +18,7 @@ from cavsumo.results.provenance import differences
 from cavsumo.results.reading import check_apart, check_cells, ego_log_name, inside, whole_lines
 from cavsumo.results.recorded_plan import recorded_plan
 from cavsumo.results.rows import Outcome
+from cavsumo.results.trace_file import packed, read_packed, unpacked
 from cavsumo.results.writing import Recorder
 
 SHOWN = 5  # missing episodes that are named
@@ -138,12 +139,12 @@ def _numbered(part: Path, index: int) -> Iterator[Numbered]:
             yield run, index, row
 
 
-def _trace_of(part: Path, row: dict[str, str]) -> str:
-    """The trace of a row, empty for none."""
+def _trace_of(part: Path, row: dict[str, str]) -> bytes:
+    """The bytes of a row's trace file, empty for none; one that is plain text is compressed."""
     if not row["trace"]:
-        return ""
-    what = f"results {str(part)!r}: trace of run {row['run']}"
-    return read_text(inside(part, row["trace"]), what, ResultsError)
+        return b""
+    file, what = inside(part, row["trace"]), f"results {str(part)!r}: trace of run {row['run']}"
+    return packed(unpacked(read_packed(file, what), f"{what} {str(file)!r}"))
 
 
 def _log_of(part: Path, run: int) -> str:

@@ -1,6 +1,6 @@
 """The messages to a simulating process and back: a task and a reply.
 
-Each is pickled once. A row and the text of a trace are made in the simulating process and pass
+Each is pickled once. A row and the bytes of a trace are made in the simulating process and pass
 unchanged into the files; ``PreparedBatch`` packs the batch.
 """
 

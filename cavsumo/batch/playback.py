@@ -13,7 +13,7 @@ from cavsumo.batch.worker import Worker
 from cavsumo.errors import InputError, ResultsError
 from cavsumo.model.bodies import Action
 from cavsumo.model.scenario import BatchPlan
-from cavsumo.results.traces import Trace, parsed
+from cavsumo.results.traces import Trace, trace_of
 
 # Columns of which the agents and the reruns decide, so that a playback does not reproduce them.
 NOT_PLAYED_BACK = frozenset(
@@ -87,7 +87,7 @@ def for_playback(record: Record) -> Record:
 def played_back(worker: Worker, record: Record) -> Replayed:
     """An episode played back by a worker of its plan; the record is that of ``for_playback``."""
     outcome = worker.play(playback_job(record)).outcome
-    return Replayed(outcome.row, parsed(outcome.trace) if outcome.trace else None)
+    return Replayed(outcome.row, trace_of(outcome))
 
 
 def playback_job(record: Record) -> Job:

@@ -21,7 +21,7 @@ from cavsumo.results.columns import COLUMNS, Row
 from cavsumo.results.reading import check_cells, inside, rows_of
 from cavsumo.results.recorded_plan import plan_in, recorded_plan
 from cavsumo.results.rows import cell
-from cavsumo.results.traces import NOT_REPLAYED, Trace, parsed, read_trace
+from cavsumo.results.traces import NOT_REPLAYED, Trace, read_trace, trace_of
 
 
 @dataclass(frozen=True)
@@ -137,7 +137,7 @@ def replayed(worker: Worker, record: Record) -> Replayed:
     alone.
     """
     outcome = _played_again(worker, record).outcome
-    return Replayed(outcome.row, parsed(outcome.trace) if outcome.trace else None)
+    return Replayed(outcome.row, trace_of(outcome))
 
 
 def _played_again(worker: Worker, record: Record) -> Answer:

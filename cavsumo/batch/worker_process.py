@@ -8,6 +8,7 @@ inside SUMO, where Python does not run.
 from __future__ import annotations
 
 import contextlib
+import gc
 import os
 import signal
 import sys
@@ -59,6 +60,8 @@ def _serve(pipe: Connection, first: Task, log: int) -> None:
         except (CavsumoError, OSError) as error:
             pipe.send(Reply("refused", str(error)))
             return
+        gc.collect()
+        gc.freeze()  # what is there now stays: it need not be looked through again and again
         pipe.send(Reply("ready"))
         deadline = prepared.plan.deadline_s
         streams = sys.stderr.fileno(), log

@@ -10,7 +10,7 @@ from cavsumo.model.scenario import BatchPlan
 
 if TYPE_CHECKING:  # the process that collects rows does not load SUMO
     from cavsumo.simulation.avoidability import Avoidability
-    from cavsumo.simulation.loop import Episode
+    from cavsumo.simulation.episode import Episode
 
 
 @dataclass(frozen=True)

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from cavsumo.agents.base import Forecast
     from cavsumo.simulation.avoidability import Avoidability
     from cavsumo.simulation.ego_progress import EgoProgress
-    from cavsumo.simulation.loop import Episode
+    from cavsumo.simulation.episode import Episode
 
 Row = dict[str, Any]
 

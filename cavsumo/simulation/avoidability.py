@@ -28,7 +28,8 @@ from cavsumo.model.forks import can_fork, cost_of_fork, result_of
 from cavsumo.model.scene import Scene
 from cavsumo.model.snapshot import BodyState, Snapshot
 from cavsumo.simulation.avoidability_guess import foreseen
-from cavsumo.simulation.loop import Episode, EpisodeLoop
+from cavsumo.simulation.episode import Episode
+from cavsumo.simulation.loop import EpisodeLoop
 from cavsumo.simulation.playback import doing, playback, recorded
 from cavsumo.simulation.reruns import Rerun
 from cavsumo.simulation.setup import Setup
@@ -221,8 +222,8 @@ class AvoidabilityCheck:
             actions = [list(joint) for joint in self.episode.actions]
             kept.hand_over(doing(actions, len(self.setup.teams)))
             return Rerun(kept, self.episode, self.broken)
-        # Bodies that the rerun leaves out count with their states of the first episode.
-        record = self.record or any(a.sees_background for a in self.setup.assertions)
+        # Where nobody looks at the background, a rerun shows as much of it as contacts need.
+        record = any(a.sees_background for a in self.setup.assertions)
         setup = dataclasses.replace(self.setup, assertions=(self.broken,))
         loop = playback(setup, self._recorded, record=record, alike=self.agents)
         return Rerun(loop, self.episode, self.broken)

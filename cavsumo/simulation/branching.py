@@ -25,7 +25,8 @@ from cavsumo.agents.base import Agent
 from cavsumo.egos.base import Ego
 from cavsumo.errors import BranchError, CavsumoError, SimulationError
 from cavsumo.model.forks import can_fork, forked
-from cavsumo.simulation.loop import Episode, EpisodeLoop, Joint
+from cavsumo.simulation.episode import Episode, Joint
+from cavsumo.simulation.loop import EpisodeLoop
 from cavsumo.simulation.playback import doing
 
 DEADLINE_S = 60.0

@@ -18,7 +18,8 @@ from cavsumo.egos.reference import Reference
 from cavsumo.errors import BranchError
 from cavsumo.model.forks import Fork, can_fork, cost_of_fork
 from cavsumo.simulation.avoidability import Avoidability, AvoidabilityCheck
-from cavsumo.simulation.loop import Episode, EpisodeLoop
+from cavsumo.simulation.episode import Episode
+from cavsumo.simulation.loop import EpisodeLoop
 from cavsumo.simulation.setup import Setup
 
 QUICK_S = 0.05  # a start that takes less takes less than twenty forks

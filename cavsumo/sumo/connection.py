@@ -17,6 +17,7 @@ from cavsumo.errors import SimulationError
 from cavsumo.model.departures import Attributes, Demand
 from cavsumo.model.scenario import Scenario
 from cavsumo.network.site import Site
+from cavsumo.sumo.calls import direct
 from cavsumo.sumo.late_routes import LateRoutes, refusal
 from cavsumo.sumo.native import Library
 from cavsumo.sumo.options import OPTIONS
@@ -41,6 +42,7 @@ class Simulations:
 
     def __init__(self, sumo: Any, scenario: Scenario, site: Site, ego: Ego, folder: Path) -> None:
         self._sumo, self._scenario, self._site = sumo, scenario, site
+        self._step = direct(sumo.simulation, "step")
         self._types = folder / "types.add.xml"
         self._types.write_text(type_file(scenario, ego), encoding="utf-8")
         self._stands_by = self.stood_by = False
@@ -97,7 +99,7 @@ class Simulations:
         """One timestep of SUMO."""
         if self._late is not None:
             self._late.read()
-        self._sumo.simulationStep()
+        self._step(0.0)
 
     def set_light(self) -> None:
         """Set the first traffic light on the ego's route to its required phase."""

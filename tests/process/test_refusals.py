@@ -77,6 +77,7 @@ REFUSED = {
     "certify nowhere.csv 0": "manifest 'nowhere.json': cannot be read",
     "replay old.csv": "which run of 'old.csv'?",
     "replay nowhere.csv 0": "manifest 'nowhere.json': cannot be read",
+    "replay nowhere.jsonl.gz": "trace 'nowhere.jsonl.gz': cannot be read: No such file",
     "replay nowhere.jsonl": "trace 'nowhere.jsonl': cannot be read: No such file",
     "replay old.csv 0 --html nowhere/a.html": "no such folder 'nowhere'",
     "report nowhere.csv": "manifest 'nowhere.json': cannot be read",

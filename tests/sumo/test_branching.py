@@ -23,7 +23,8 @@ from cavsumo.errors import BranchError
 from cavsumo.model.bodies import NOOP, Action
 from cavsumo.model.snapshot import Snapshot
 from cavsumo.simulation.branching import Continuation, branch, branches
-from cavsumo.simulation.loop import Episode, EpisodeLoop
+from cavsumo.simulation.episode import Episode
+from cavsumo.simulation.loop import EpisodeLoop
 from cavsumo.simulation.playback import played_back, recorded
 from cavsumo.sumo import native
 

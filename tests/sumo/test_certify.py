@@ -33,7 +33,7 @@ from cavsumo.results.reading import HEADER
 from cavsumo.results.recorded_plan import recorded_plan
 from cavsumo.results.rows import row_line
 from cavsumo.results.statistics import lower_bound
-from cavsumo.results.traces import Trace, parsed
+from cavsumo.results.traces import Trace, trace_of
 
 LEARNT = 5  # the third episode of the learner in the results
 # An ego that fails in every episode whose seed is odd.
@@ -91,7 +91,9 @@ def traced(plan: BatchPlan, run: int, seed: int | None = None) -> Trace:
     if seed is not None:
         again = dataclasses.replace(again, seed=seed)
     with EpisodeRunner(prepare(plan)) as runner:
-        return parsed(runner.play(again).outcome.trace)
+        found = trace_of(runner.play(again).outcome)
+    assert found is not None
+    return found
 
 
 # What is played

@@ -120,7 +120,7 @@ def damage(file: Path, change: Callable[[list[bytes]], list[bytes]]) -> None:
 
 def untraced(home: Path) -> None:
     """Remove one trace of part b."""
-    min((home / "b").glob("*.jsonl")).unlink()
+    min((home / "b").glob("*.jsonl.gz")).unlink()
 
 
 def foreign(home: Path) -> None:

@@ -19,6 +19,7 @@ import cavsumo
 from cavsumo.batch.certify.used_seeds import used
 from cavsumo.cli import main
 from cavsumo.results.reading import FIRST, read_manifest
+from cavsumo.results.trace_file import read_trace_text
 
 RUN = 1  # which the ego fails
 PLAYED = ("run", "--net", "networks/crossing.net.xml", "--runs", "2", "--trace", "all")
@@ -86,8 +87,30 @@ def test_a_trace_is_played_with_the_inputs_beside_it(
 ) -> None:
     """The folder of traces alone, sent to somebody."""
     shutil.copytree(moved / "results", elsewhere / "sent")
-    assert main(["replay", "sent/run000001.jsonl"]) == 0
+    assert main(["replay", "sent/run000001.jsonl.gz"]) == 0
     assert capsys.readouterr().out.endswith(" frames: the same\n")
+
+
+def test_traces_that_are_not_compressed_are_read_everywhere(
+    moved: Path, elsewhere: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """As 0.1 left them: replayed, shown, reported, certified, loaded and merged."""
+    for stem in ("results", "part1", "part2"):
+        file = _copied(moved, elsewhere, stem)
+        for trace in file.with_suffix("").glob("*.jsonl.gz"):
+            trace.with_suffix("").write_text(read_trace_text(trace), encoding="utf-8")
+            trace.unlink()
+        file.write_text(file.read_text("utf-8").replace(".jsonl.gz", ".jsonl"), "utf-8")
+    one = "results/run000001.jsonl"
+    assert main(["replay", one]) == main(["replay", one, "--playback"]) == 0
+    assert main(["replay", "results.csv", "1", "--recorded", "--fcd", "f.xml"]) == 0
+    assert main(["report", "results.csv", "--html", "report.html", "-o", "t.txt"]) == 0
+    assert "No replay pages" not in capsys.readouterr().err
+    words = ["certify", "results.csv", str(RUN), "--runs", "1", "--open-loop", "-o", "c.csv"]
+    assert main([*words, *QUIET]) == 0
+    assert cavsumo.load("results.csv").replay(RUN, recorded=True).row["outcome"] == "violated"
+    assert main(["merge", "part1.csv", "part2.csv", "-o", "whole.csv", "-q"]) == 0
+    assert content(Path("whole")) == content(moved / "results")  # compressed again
 
 
 def test_python_plays_them_too(moved: Path, elsewhere: Path) -> None:
@@ -124,7 +147,7 @@ def test_a_report_says_which_pages_it_cannot_make(
     (elsewhere / "results").mkdir()
     shutil.copytree(moved / "results" / "inputs", elsewhere / "results" / "inputs")
     text = file.read_text("utf-8")
-    file.write_text(re.sub(r"results/run\d+\.jsonl", "", text), "utf-8")
+    file.write_text(re.sub(r"results/run\d+\.jsonl\.gz", "", text), "utf-8")
     assert main(["report", str(file), "--html", "report.html", "-o", "t.txt"]) == 0
     assert "pages of 1 of the listed runs: no trace of them was kept" in capsys.readouterr().err
 

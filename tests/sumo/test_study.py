@@ -232,7 +232,7 @@ def test_a_study_is_its_batches(home: Path, capsys: pytest.CaptureFixture[str]) 
     part, single = Path("results-testers2.csv"), Path("alone.csv")
     assert untold(rows(part)) == untold(rows(single))
     assert read_manifest(part)["learned"] == read_manifest(single)["learned"]
-    assert len(list(part.with_suffix("").glob("*.jsonl"))) == 4
+    assert len(list(part.with_suffix("").glob("*.jsonl.gz"))) == 4
     before = content(home)
     shutil.rmtree(home / "results-testers2")
     (home / "results-testers2.csv").unlink()

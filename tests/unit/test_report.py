@@ -13,6 +13,7 @@ from pathlib import Path
 
 import pytest
 from report_files import ERROR, FAILED, HELD, JUDGED, NOTHING, SOME, UNFAIR, write
+from support import json_lines
 
 from cavsumo.cli import main
 from cavsumo.errors import InputError
@@ -21,7 +22,7 @@ from cavsumo.report.distinct import Cell, FailureCell, failure_cells
 from cavsumo.report.events import Described, Event, side_ahead, side_hit
 from cavsumo.report.formats import FORMATS, as_table
 from cavsumo.results.columns import COLUMNS
-from cavsumo.results.traces import read_moments, trace_text
+from cavsumo.results.traces import read_moments
 
 Says = Callable[..., str]
 
@@ -365,7 +366,7 @@ def test_moments_of_a_trace(tmp_path: Path) -> None:
         "time_s": "0.2",
     }
     file = tmp_path / "t.jsonl"
-    file.write_text(trace_text(head, frames), encoding="utf-8")
+    file.write_text(json_lines(head, *frames), encoding="utf-8")
     moments = read_moments(file, [0.1, 0.26, 0.0])
     assert [(driven, frame["step"]) for driven, frame in moments] == [(3.0, 1), (7.0, 2), (0.0, 0)]
 
