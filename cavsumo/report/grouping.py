@@ -5,10 +5,12 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import pandas
 
+from cavsumo.batch.tally import COUNTED, Found
 from cavsumo.errors import InputError
 from cavsumo.report.load import Batch, Evidence
 from cavsumo.results.provenance import EXTENT, differences
@@ -25,6 +27,7 @@ MEANT: dict[str, frozenset[str]] = {
     "sumo_width_m": frozenset({"sumo_width"}),
     "net": frozenset({"net", "routes", "additional", "ego_route", "junction"}),
 }
+COUNTED_AT_ONCE = 50_000  # rows, whose cells are Python's objects meanwhile
 COMPARED = ("versions", "sha256", "sumo_options")  # parts of a manifest besides the plan
 WITH_FILES = ("net", "file")  # where the files' checksums differ too
 
@@ -63,6 +66,16 @@ class Group(Told):
     sequential: bool
     reference: str = ""
 
+    @cached_property
+    def found(self) -> Found:
+        """The counts of its rows."""
+        found = Found()
+        for start in range(0, len(self.rows), COUNTED_AT_ONCE):
+            rows = self.rows.iloc[start : start + COUNTED_AT_ONCE]
+            none = [None] * len(rows)
+            found.count({n: rows[n].tolist() if n in rows else none for n in COUNTED})
+        return found
+
     @property
     def valid(self) -> pandas.DataFrame:
         """The rows of valid episodes."""
@@ -82,7 +95,7 @@ def grouped(evidence: Evidence, by: str = "agent") -> list[Group]:
     place = evidence.rows["batch"].map(dict(enumerate(settings)))
     keys = [place, evidence.rows["agent"]]
     keys += [] if by == "agent" else [evidence.rows[by].map(_word)]
-    found = list(evidence.rows.groupby(keys, sort=False))
+    found = list(evidence.rows.groupby(keys, sort=False, observed=True))
     if len(found) > MOST:
         raise InputError(f"--by {by}: {len(found)} groups, expected a column with few values")
     found.sort(key=lambda item: item[0][0])  # stable: within a setting as they appear

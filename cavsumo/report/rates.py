@@ -6,7 +6,6 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 from cavsumo.assertions.base import VIOLATED
-from cavsumo.batch.tally import tallied
 from cavsumo.report.grouping import Group, Told
 from cavsumo.results.statistics import Rate, rate, sequential_rate
 
@@ -66,7 +65,7 @@ class Rates(Told):
 
 def rates(group: Group) -> Rates:
     """The shares of one group."""
-    found = tallied(group.rows.to_dict("records"))
+    found = group.found
     failed = group.rows[group.rows["outcome"] == VIOLATED]
 
     def of(name: str, total: str, words: str) -> Share:
@@ -87,7 +86,7 @@ def rates(group: Group) -> Rates:
         reference=group.reference,
         blame={
             rule or NO_RULE: share(count, found.failures, "failures", sequential=group.sequential)
-            for rule, count in failed["blame"].value_counts().items()
+            for rule, count in failed["blame"].astype("object").value_counts().items()
         },
     )
 
