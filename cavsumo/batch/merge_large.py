@@ -17,14 +17,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cavsumo.batch.merge_parts import outcome_of, trace_of
-from cavsumo.batch.tally import COUNTED, Tally
+from cavsumo.batch.tally import AT_ONCE, COUNTED, Tally
 from cavsumo.errors import ResultsError
 from cavsumo.results.columnar import CHECKED, Doubtful, LineBlock, block, blocks, check_table
 from cavsumo.results.columns import COLUMNS
 from cavsumo.results.reading import HEADER
 from cavsumo.results.writing import Recorder
 
-AT_ONCE = 20_000  # lines
 # Anything but printable ASCII without quotes, and numbers that begin with a needless zero.
 UNPLAIN = re.compile(rb"[^ !#-~\n]|^0[0-9]", re.MULTILINE)
 

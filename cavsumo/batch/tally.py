@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from itertools import compress
+from itertools import compress, islice
 from typing import TYPE_CHECKING, Any
 
 from cavsumo.assertions.base import HELD, INVALID, UNFAIR, VIOLATED
@@ -18,6 +18,7 @@ if TYPE_CHECKING:
 
 Row = Mapping[str, Any]
 Columns = Mapping[str, Sequence[Any]]  # cells by column, one each row
+AT_ONCE = 10_000  # rows that are in memory while they are counted
 RATES = ("tests", "preventable", "failures")
 ERROR, TESTS = "error", (HELD, VIOLATED)
 DRIVES = ("arrived", "lost_s", "frozen")
@@ -176,7 +177,13 @@ class Tally:
 
     def add(self, row: Row) -> None:
         """Count one more row, as made or as read."""
-        self.add_all({name: [row.get(name)] for name in COUNTED}, lambda _: row)
+        self.add_rows([row])
+
+    def add_rows(self, rows: Iterable[Row]) -> None:
+        """Count rows; many are counted faster together."""
+        rows = iter(rows)
+        while some := list(islice(rows, AT_ONCE)):
+            self.add_all({n: [row.get(n) for row in some] for n in COUNTED}, some.__getitem__)
 
     def add_all(self, columns: Columns, row: Callable[[int], Row]) -> None:
         """Count rows given by columns, all of ``COUNTED``; ``row`` gives one of them by its place.

@@ -10,7 +10,7 @@ from typing import Any
 
 import pandas
 
-from cavsumo.batch.tally import COUNTED, Found
+from cavsumo.batch.tally import AT_ONCE, COUNTED, Found
 from cavsumo.errors import InputError
 from cavsumo.report.load import Batch, Evidence
 from cavsumo.results.provenance import EXTENT, differences
@@ -27,7 +27,6 @@ MEANT: dict[str, frozenset[str]] = {
     "sumo_width_m": frozenset({"sumo_width"}),
     "net": frozenset({"net", "routes", "additional", "ego_route", "junction"}),
 }
-COUNTED_AT_ONCE = 50_000  # rows, whose cells are Python's objects meanwhile
 COMPARED = ("versions", "sha256", "sumo_options")  # parts of a manifest besides the plan
 WITH_FILES = ("net", "file")  # where the files' checksums differ too
 
@@ -70,8 +69,8 @@ class Group(Told):
     def found(self) -> Found:
         """The counts of its rows."""
         found = Found()
-        for start in range(0, len(self.rows), COUNTED_AT_ONCE):
-            rows = self.rows.iloc[start : start + COUNTED_AT_ONCE]
+        for start in range(0, len(self.rows), AT_ONCE):
+            rows = self.rows.iloc[start : start + AT_ONCE]
             none = [None] * len(rows)
             found.count({n: rows[n].tolist() if n in rows else none for n in COUNTED})
         return found
