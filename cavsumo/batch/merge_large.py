@@ -21,7 +21,6 @@ from cavsumo.batch.tally import AT_ONCE, COUNTED, Tally
 from cavsumo.errors import ResultsError
 from cavsumo.results.columnar import CHECKED, Doubtful, LineBlock, block, blocks, check_table
 from cavsumo.results.columns import COLUMNS
-from cavsumo.results.reading import HEADER
 from cavsumo.results.writing import Recorder
 
 # Anything but printable ASCII without quotes, and numbers that begin with a needless zero.

@@ -231,11 +231,29 @@ def test_replays(play: Play, capsys: pytest.CaptureFixture[str]) -> None:
     assert numbers(capsys.readouterr().out.splitlines()[-2]) == [1, 1, 0]
 
 
+def test_scale(play: Play, capsys: pytest.CaptureFixture[str]) -> None:
+    """Four episodes for eight rows, read by this checkout twice."""
+    with pytest.raises(SystemExit) as ended:
+        play("scale", "--rows", "8", "--played", "2", "--other", str(ROOT))
+    said = capsys.readouterr().out
+    assert ended.value.code == 0, said
+    assert said.count("the same bytes") == 3
+
+
 def test_shared(play: Play) -> None:
     """A block of two episodes."""
     said = play("shared", "--blocks", "1", "--net", NET, SHARED_BY=2)
     assert "2 episodes" in said.splitlines()[0]
     assert "tests found" in said.splitlines()[-1]
+
+
+def test_soak(play: Play, capsys: pytest.CaptureFixture[str]) -> None:
+    """Three episodes, and no time for a kill."""
+    with pytest.raises(SystemExit) as ended:
+        play("soak", "--episodes", "3", "--quiet", "2", "--kills-every", "1000", "-j", "1")
+    said = capsys.readouterr().out
+    assert ended.value.code == 0, said
+    assert "0 errors, 0 after --retry-errors; 0 rows missing, in order: True" in said
 
 
 def test_ssm(play: Play) -> None:

@@ -125,8 +125,9 @@ def test_checked_tables_are_rows_that_are_accepted(file: Path, change: Change) -
 
 def test_an_undamaged_file_is_read_by_columns(file: Path) -> None:
     """Also one with quotes and with letters of other languages."""
+    content = file.read_text(encoding="utf-8")
     for change in ("nothing", "torn", "a quoted comma", "other letters", "a run with a zero"):
-        file.write_text(CHANGES[change](file.read_text(encoding="utf-8")), encoding="utf-8")
+        file.write_text(CHANGES[change](content), encoding="utf-8")
         lines = sum(len(block.ends) for block in blocks(file))
         assert lines == file.read_bytes().count(b"\n") - 1
 
@@ -141,9 +142,8 @@ def test_columns_that_were_added_since_are_empty(file: Path) -> None:
         writer.writerows([row[i] for i in kept] for row in [header, *rows])
     tables = [block.table(("lost_s", "seed"), ("seed",)) for block in blocks(file)]
     assert {cell for table in tables for cell in table["lost_s"]} == {""}
-    assert [seed for t in tables for seed in t["seed"]] == [
-        int(r[header.index("seed")]) for r in rows
-    ]
+    seeds = [int(row[header.index("seed")]) for row in rows]
+    assert [seed for table in tables for seed in table["seed"]] == seeds
 
 
 @pytest.mark.parametrize("size", [1, 3, 100])
