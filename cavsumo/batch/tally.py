@@ -21,12 +21,13 @@ Columns = Mapping[str, Sequence[Any]]  # cells by column, one each row
 AT_ONCE = 10_000  # rows that are in memory while they are counted
 RATES = ("tests", "preventable", "failures")
 ERROR, TESTS = "error", (HELD, VIOLATED)
+JUDGED = ("avoidable", "avoidable_ideal")
 DRIVES = ("arrived", "lost_s", "frozen")
 KINDS = ("outcome", "avoidable", "frozen")  # columns that say what a row can be the first of
 # Columns that are counted.
 COUNTED = (
     *("agent", "outcome", "reset", "verdicts", "forecast", "trigger_time_s", "time_s"),
-    *("avoidable", *DRIVES),
+    *(*JUDGED, *DRIVES),
 )
 
 
@@ -41,6 +42,8 @@ class Found:
         censored: when valid episodes without a test ended, likewise.
         verdicts: for each assertion, how often it said what.
         kinds: failures by ``failures.failure_kind``.
+        ideal: of the unpreventable ones, how many the ideal driver would have avoided (True) or
+            not, as far as it was asked.
         arrivals: in how many episodes that no verdict ended the ego arrived (True) or not.
         lost_s, compared: time lost against the free drive [s], and in how many episodes.
         frozen: how often the ego stood still or crawled, by the column's word.
@@ -53,6 +56,7 @@ class Found:
     censored: Counter[float] = field(default_factory=Counter)
     verdicts: dict[str, Counter[str]] = field(default_factory=dict)
     kinds: Counter[str] = field(default_factory=Counter)
+    ideal: Counter[bool] = field(default_factory=Counter)
     arrivals: Counter[bool] = field(default_factory=Counter)
     lost_s: float = 0.0
     compared: int = 0
@@ -74,10 +78,18 @@ class Found:
         self.times.update(_times(compress(columns["trigger_time_s"], tests)))
         ended = [outcome not in (*TESTS, ERROR, INVALID) for outcome in outcomes]
         self.censored.update(_times(compress(columns["time_s"], ended)))
-        failed = [outcome == VIOLATED for outcome in outcomes]
-        for said, count in Counter(map(cell, compress(columns["avoidable"], failed))).items():
-            self.kinds[failure_kind({"outcome": VIOLATED, "avoidable": said})] += count
+        self._count_failures(columns)
         self._count_drives(columns, [test or end for test, end in zip(tests, ended, strict=True)])
+
+    def _count_failures(self, columns: Columns) -> None:
+        """Count failures by who would have avoided them."""
+        failed = [outcome == VIOLATED for outcome in columns["outcome"]]
+        judged = (map(cell, compress(columns[name], failed)) for name in JUDGED)
+        for (avoidable, ideal), count in Counter(zip(*judged, strict=True)).items():
+            kind = failure_kind({"outcome": VIOLATED, "avoidable": avoidable})
+            self.kinds[kind] += count
+            if kind == UNPREVENTABLE and ideal:
+                self.ideal[float(ideal) == 1.0] += count
 
     def _count_drives(self, columns: Columns, valid: Sequence[bool]) -> None:
         """Count how the ego came along in valid episodes."""
@@ -226,6 +238,7 @@ def found_by(agents: Iterable[Found]) -> Found:
         together.outcomes.update(found.outcomes)
         together.fresh += found.fresh
         together.kinds.update(found.kinds)
+        together.ideal.update(found.ideal)
         together.arrivals.update(found.arrivals)
         together.lost_s += found.lost_s
         together.compared += found.compared

@@ -16,6 +16,7 @@ from cavsumo.assertions.base import VIOLATED
 from cavsumo.batch import sentences
 from cavsumo.batch.sentences import event
 from cavsumo.batch.summary import interval, percent
+from cavsumo.egos.reference import IDEAL
 from cavsumo.report.driving import EgoDriving, driving
 from cavsumo.report.grouping import Group, reference_of
 from cavsumo.report.load import Batch, Evidence
@@ -63,6 +64,7 @@ def _properties(parent: ET.Element, agent: str, found: Rates) -> None:
         ("preventable", found.preventable) if judged else ("failures", found.failures),
         ("tests", found.tests),
         *([("unpreventable", found.unpreventable)] if judged else []),
+        *([(f"preventable-{IDEAL}-only", found.by_ideal)] if found.by_ideal else []),
         ("unfair", found.unfair),
     ):
         spans = "; ".join(f"{m} {interval(r)}" for m, r in share.intervals.items() if share.total)

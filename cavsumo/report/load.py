@@ -30,6 +30,7 @@ NUMBERS = (
     "impact_speed_mps",
     "wall_s",
     "avoidable",
+    "avoidable_ideal",
     "arrived",
     "lost_s",
     "stood_s",
