@@ -183,9 +183,7 @@ class Results:
     def _summary(self) -> ResultsSummary:
         """The summary of the results."""
         tally, judged = Tally(), self.plan.reference != "none"
-        for _, row in whole_lines(self.file):
-            if row is not None:
-                tally.add(row)
+        tally.add_rows(row for _, row in whole_lines(self.file) if row is not None)
         return ResultsSummary(self.scenario, tally, self.failures, judged, self._place)
 
     @property

@@ -65,14 +65,18 @@ class BatchRun:
         """Take up the recorded rows."""
         self._todo = self.prepared.plan.todo()
         self._knowledge = Knowledge(self.prepared, manifest)
-        for row in self.recorder.resume(manifest, self._todo):
-            check_cells(self.recorder.csv_file, row)
-            self.tally.add(row)
-            self._knowledge.seen(row)
+        self.tally.add_rows(self._recorded(manifest))
         self._knowledge.catch_up(self.executor)
         self.left_out = self.recorder.keep(self.prepared.inputs)
         recorded = manifest["status"]
         self.status = recorded if recorded in COMPLETE else "interrupted"
+
+    def _recorded(self, manifest: Mapping[str, Any]) -> Iterator[Mapping[str, Any]]:
+        """The recorded rows, checked, and seen by those who learn from them."""
+        for row in self.recorder.resume(manifest, self._todo):
+            check_cells(self.recorder.csv_file, row)
+            self._knowledge.seen(row)
+            yield row
 
     def play(self) -> None:
         """Play the remaining episodes, until the end or a reason to stop."""
@@ -116,8 +120,7 @@ class BatchRun:
             raise BatchError("interrupted before the learning agents were done: nothing changed")
         self.recorder.replace(replaced)
         self.tally = Tally()
-        for row in rows_of(self.recorder.csv_file):
-            self.tally.add(row)
+        self.tally.add_rows(rows_of(self.recorder.csv_file))
 
     def end(self) -> None:
         """Complete the manifest."""

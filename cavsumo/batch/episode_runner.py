@@ -12,7 +12,7 @@ from cavsumo.assertions.base import VIOLATED
 from cavsumo.batch.jobs import Job, Memory, finished
 from cavsumo.batch.messages import Answer
 from cavsumo.batch.prepared import PreparedBatch
-from cavsumo.egos.reference import REFERENCES
+from cavsumo.egos.reference import IDEAL, REFERENCES
 from cavsumo.errors import CavsumoError, EgoError
 from cavsumo.model.objects import is_instance
 from cavsumo.model.seeds import episode_seed
@@ -99,11 +99,13 @@ class EpisodeRunner:
             if not judge and retry and episode.outcome == VIOLATED:
                 record = judged = False
             elif retry and episode.outcome == VIOLATED:
-                reference = REFERENCES.make(self.plan.reference, {})
+                reference, ideal = (
+                    REFERENCES.make(name, {}) for name in (self.plan.reference, IDEAL)
+                )
                 if checkpoint is not None:
                     beat()
-                    avoidability = checkpoint.judged(episode, reference)
-                avoidability = avoidability or check(episode).judged(reference)
+                    avoidability = checkpoint.judged(episode, reference, ideal)
+                avoidability = avoidability or check(episode).judged(reference, ideal)
             row = row_of(finished(self.plan, job, episode, avoidability))
             trace = self._trace(job, row, before, episode) if record else b""
         except Exception as error:  # any error costs this row and no other

@@ -51,6 +51,9 @@ class Described(NamedTuple):
     impact: Event | None
 
 
+UNTRACED = Described(Event(), None)  # a test that the ego passed, of which nothing is known
+
+
 def described(evidence: Evidence) -> dict[int, Described]:
     """Every test of the evidence, by the index of its row."""
     rows = evidence.rows
@@ -67,6 +70,8 @@ def _each(evidence: Evidence, tests: pandas.DataFrame) -> Iterator[tuple[int, De
 def describe(row: Mapping[str, Any], csv_file: Path) -> Described:
     """One test, from its row and from the trace it names, beside its results file."""
     failed = row["outcome"] == "violated"
+    if not (failed or row["trace"]):
+        return UNTRACED
     times = [row["trigger_time_s"], *([row["violation_time_s"]] if failed else [])]
     moments: Sequence[Moment | None] = [None] * len(times)
     if row["trace"]:

@@ -5,10 +5,12 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import pandas
 
+from cavsumo.batch.tally import AT_ONCE, COUNTED, Found
 from cavsumo.errors import InputError
 from cavsumo.report.load import Batch, Evidence
 from cavsumo.results.provenance import EXTENT, differences
@@ -63,6 +65,16 @@ class Group(Told):
     sequential: bool
     reference: str = ""
 
+    @cached_property
+    def found(self) -> Found:
+        """The counts of its rows."""
+        found = Found()
+        for start in range(0, len(self.rows), AT_ONCE):
+            rows = self.rows.iloc[start : start + AT_ONCE]
+            none = [None] * len(rows)
+            found.count({n: rows[n].tolist() if n in rows else none for n in COUNTED})
+        return found
+
     @property
     def valid(self) -> pandas.DataFrame:
         """The rows of valid episodes."""
@@ -82,7 +94,7 @@ def grouped(evidence: Evidence, by: str = "agent") -> list[Group]:
     place = evidence.rows["batch"].map(dict(enumerate(settings)))
     keys = [place, evidence.rows["agent"]]
     keys += [] if by == "agent" else [evidence.rows[by].map(_word)]
-    found = list(evidence.rows.groupby(keys, sort=False))
+    found = list(evidence.rows.groupby(keys, sort=False, observed=True))
     if len(found) > MOST:
         raise InputError(f"--by {by}: {len(found)} groups, expected a column with few values")
     found.sort(key=lambda item: item[0][0])  # stable: within a setting as they appear

@@ -301,6 +301,14 @@ _ALL = (
         _retried(_avoidable),
     ),
     Column(
+        "avoidable_ideal",
+        "1 if the ideal driver would have avoided it (full braking at once), else 0; empty if not "
+        "judged",
+        "",
+        _retried(lambda found: None if found.by_ideal is None else int(found.by_ideal)),
+        since="0.2",
+    ),
+    Column(
         "reference",
         "the reference driver",
         "",

@@ -132,16 +132,27 @@ class Recorder:
         """Append a row, its trace first; raises BatchError when the disk takes no more."""
         self._check_own()
         row = self._with_trace(outcome)
-        line = _line(row)
+        self._append(_line(row), row["run"])
+        return row
+
+    def copy(self, lines: bytes, last: int) -> None:
+        """Append lines that are rows as ``write`` would write them, without any files.
+
+        ``last``: the number of the last of them.
+        """
+        self._check_own()
+        self._append(lines, last)
+
+    def _append(self, lines: bytes, last: int) -> None:
+        """Append lines; none of them stays when the disk takes no more."""
         try:
-            _write_all(self._file, line)
+            _write_all(self._file, lines)
         except OSError as error:
             self._file.truncate(self._size)
             self._note(b"")
             raise self._no_more(error) from error
-        self._note(line)
-        self._last = row["run"]
-        return row
+        self._note(lines)
+        self._last = last
 
     def replace(self, outcomes: Mapping[int, Outcome]) -> None:
         """Replace some rows, all at once or not at all."""

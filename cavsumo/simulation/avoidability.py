@@ -53,12 +53,14 @@ class Avoidability:
         last_chance: time of the latest perception with which it still would [s]; None if never.
         margin: how long before the violation that is [s].
         note: what kept it from being judged, or what to doubt, as a sentence.
+        by_ideal: whether the ideal driver would have avoided it; None if not judged.
     """
 
     avoidable: bool | None
     last_chance: float | None = None
     margin: float | None = None
     note: str = ""
+    by_ideal: bool | None = None
 
 
 class NotJudged(CavsumoError):
@@ -104,14 +106,17 @@ class AvoidabilityCheck:
         assert time is not None
         return min(round(time / self.setup.world.dt), len(self.episode.frames) - 1)
 
-    def judged(self, reference: Reference) -> Avoidability:
-        """Whether a reference driver would have avoided it, and until when."""
+    def judged(self, reference: Reference, ideal: Reference | None = None) -> Avoidability:
+        """Whether a reference driver would have avoided it, and until when.
+
+        ``ideal``: another driver; of it only the first is asked (``Avoidability.by_ideal``).
+        """
         try:
-            return self._judged(reference)
+            return self._judged(reference, ideal)
         except CavsumoError as error:
             return Avoidability(None, note=f"not judged: {error}")
 
-    def _judged(self, reference: Reference) -> Avoidability:
+    def _judged(self, reference: Reference, ideal: Reference | None) -> Avoidability:
         self._check_moving()
         end, frames = self.end, self.episode.frames
         perceived, guess = self._perceived(reference), self._guess(reference)
@@ -134,9 +139,23 @@ class AvoidabilityCheck:
                 f"{frames[high - 1].time:.1f} s would have been early enough"
             )
         note = "; ".join(notes)
+        by_ideal = avoidable if type(ideal) is type(reference) else None
+        if ideal is not None and by_ideal is None:
+            by_ideal = self._first_avoided(ideal, avoided)
         if low < 0:
-            return Avoidability(avoidable, note=note)
-        return Avoidability(avoidable, frames[low].time, frames[end].time - frames[low].time, note)
+            return Avoidability(avoidable, note=note, by_ideal=by_ideal)
+        chance = frames[low].time
+        return Avoidability(avoidable, chance, frames[end].time - chance, note, by_ideal)
+
+    def _first_avoided(
+        self, reference: Reference, avoided: Callable[[Reference, int], bool]
+    ) -> bool | None:
+        """Whether a reference driver avoids it from its perception on; None if a rerun fails."""
+        perceived = self._perceived(reference)
+        try:
+            return perceived < self.end and avoided(reference, perceived)
+        except CavsumoError:
+            return None
 
     def avoidable(self, reference: Reference) -> bool:
         """Whether a reference driver would have avoided it, by one rerun at most.

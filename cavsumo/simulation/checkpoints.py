@@ -52,22 +52,22 @@ class Checkpoint:
                 words = told.read()
             if not words:
                 return None
-            episode, reference = pickle.loads(words)
+            episode, references = pickle.loads(words)
             # places are known by identity
             episode.starts, episode.waited = loop.placed.starts, loop.placed.waited
-            return check(episode, loop).judged(reference)
+            return check(episode, loop).judged(*references)
 
         try:
             self._fork = Fork(judges, 2 * deadline, keep=[source])
         finally:
             os.close(source)
 
-    def judged(self, episode: Episode, reference: Reference) -> Avoidability | None:
-        """Whether a reference driver would have avoided the violation; None if the fork failed."""
+    def judged(self, episode: Episode, *references: Reference | None) -> Avoidability | None:
+        """``AvoidabilityCheck.judged`` of the violation; None if the fork failed."""
         self._open = False
         try:
             with os.fdopen(self._sink, "wb") as sink:
-                pickle.dump((episode, reference), sink, pickle.HIGHEST_PROTOCOL)
+                pickle.dump((episode, references), sink, pickle.HIGHEST_PROTOCOL)
             return self._fork.awaited(self._deadline)
         except BranchError:
             return None

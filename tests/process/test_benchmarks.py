@@ -246,6 +246,22 @@ def test_episode_server(play: Play, capsys: pytest.CaptureFixture[str]) -> None:
 def test_reading(play: Play) -> None:
     """A small network, once."""
     assert "1 site" in play("reading", "--net", NET, "--times", "1")
+def test_scale(play: Play, capsys: pytest.CaptureFixture[str]) -> None:
+    """Four episodes for eight rows, read by this checkout twice."""
+    with pytest.raises(SystemExit) as ended:
+        play("scale", "--rows", "8", "--played", "2", "--other", str(ROOT))
+    said = capsys.readouterr().out
+    assert ended.value.code == 0, said
+    assert said.count("the same bytes") == 3
+
+
+def test_soak(play: Play, capsys: pytest.CaptureFixture[str]) -> None:
+    """Three episodes, and no time for a kill."""
+    with pytest.raises(SystemExit) as ended:
+        play("soak", "--episodes", "3", "--quiet", "2", "--kills-every", "1000", "-j", "1")
+    said = capsys.readouterr().out
+    assert ended.value.code == 0, said
+    assert "0 errors, 0 after --retry-errors; 0 rows missing, in order: True" in said
 
 
 def test_ssm(play: Play) -> None:

@@ -102,6 +102,25 @@ def test_what_could_have_been_avoided_and_who_is_to_blame(tmp_path: Path, says: 
     assert "blame ego:speed: count,2," in says(file, "--format", "csv")
 
 
+def test_failures_that_only_an_ideal_driver_avoids_are_told(tmp_path: Path, says: Says) -> None:
+    """Apart from the preventable ones, in every format; not where nobody asked."""
+    asked = [
+        (JUDGED[1][0], {**JUDGED[1][1], "avoidable_ideal": 1}),
+        (JUDGED[2][0], {**JUDGED[1][1], "avoidable_ideal": 0}),
+    ]
+    file = write(tmp_path / "asked.csv", asked, reference="human")
+    random, timing = analyse([file]).rates
+    assert random.by_ideal is None
+    assert timing.by_ideal is not None
+    assert (timing.by_ideal.count, timing.by_ideal.total, timing.unpreventable.count) == (1, 2, 2)
+    lines = [line.split() for line in says(file).splitlines()]
+    assert ["preventable", "(ideal", "only)", "1", "of", "2", "tests"] in [x[:7] for x in lines]
+    assert json.loads(says(file, "--format", "json"))["rates"][1]["by_ideal"]["count"] == 1
+    junit = tmp_path / "r.xml"
+    says(file, "--junit", junit)
+    assert "timing.preventable-ideal-only" in junit.read_text(encoding="utf-8")
+
+
 def test_pairs_leave_out_what_either_could_not_play(some: Report) -> None:
     """Of four seeds one is an error of random's: three pairs; the later agent comes first."""
     failures, tests = some.comparisons
