@@ -110,10 +110,14 @@ def _present(plan: BatchPlan, label: str) -> tuple[str, Params]:
     file = policy_file(name)
     if file is not None:
         return f"{PREFIX}{scenario.present(file)}", params
-    named = getattr(AGENTS.get(name), "FILES", ()) if name in AGENTS else ()
-    files = {key: Path(str(params[key])) for key in named if key in params}
+    files = {key: Path(str(params[key])) for key in _file_keys(name) if key in params}
     present = {key: scenario.present(file) for key, file in files.items()}
     return name, params | {key: str(present[key]) for key in files if present[key] != files[key]}
+
+
+def _file_keys(name: str) -> tuple[str, ...]:
+    """The parameters of a registered agent that name files."""
+    return tuple(getattr(AGENTS.get(name), "FILES", ())) if name in AGENTS else ()
 
 
 def _member(
@@ -141,17 +145,23 @@ def params_of(plan: BatchPlan, label: str) -> Params:
 
 
 def shown_manoeuvres(plan: BatchPlan) -> set[str]:
-    """The manoeuvres that a plan's agents are asked for, without reading a policy's file.
+    """The manoeuvres that a plan's agents are asked for, without reading files of theirs.
 
-    An episode is shown where that file may be missing; what a policy does is in its file alone. It
-    is also shown without an agent that was an object of another session.
+    An episode is shown where a policy's file or one that a parameter names may be missing. It is
+    also shown without an agent that was an object of another session.
     """
-    return {
-        Agent.manoeuvre
-        if policy_file(name) is not None or (is_object(name) and not is_here(name))
-        else make_agent(name, params_of(plan, label)).manoeuvre
-        for label, name in plan.cast.items()
-    }
+    return {_shown_manoeuvre(plan, label) for label in plan.cast}
+
+
+def _shown_manoeuvre(plan: BatchPlan, label: str) -> str:
+    """The manoeuvre of an agent of a plan; that of any agent where it cannot be built."""
+    name = plan.cast[label]
+    if policy_file(name) is not None or (is_object(name) and not is_here(name)):
+        return Agent.manoeuvre
+    params = params_of(plan, label)
+    if not params.keys().isdisjoint(_file_keys(name)):
+        return str(getattr(AGENTS.get(name), "manoeuvre", Agent.manoeuvre))
+    return make_agent(name, params).manoeuvre
 
 
 def teams(scenario: Scenario) -> tuple[tuple[int, ...], ...]:

@@ -13,6 +13,7 @@ from typing import Any
 from cavsumo.batch.manner import Manner
 from cavsumo.batch.plan_names import check_names
 from cavsumo.errors import InputError, ResultsError
+from cavsumo.model.checksums import readable_checksum
 from cavsumo.model.scenario import BatchPlan, plan_from
 from cavsumo.model.study import Part
 from cavsumo.network.network_file import root_of
@@ -97,7 +98,7 @@ def _recorded(output: Path, manner: Manner) -> dict[str, Any] | None:
 
 
 def _moved(recorded: Mapping[str, Any] | None, output: Path) -> dict[str, Path]:
-    """The present paths of the files of a batch to go on with, where none is at its place.
+    """The present paths of the files of a batch to go on with, where none can be read at its place.
 
     A file that was changed there since is none to go on with, so no other one is searched.
     """
@@ -105,7 +106,7 @@ def _moved(recorded: Mapping[str, Any] | None, output: Path) -> dict[str, Path]:
         plan = BatchPlan.model_validate((recorded or {})["plan"])
     except (KeyError, ValueError):  # a new batch, or none to go on with
         return {}
-    gone = [name for name, was in input_files(plan).items() if not was.is_file()]
+    gone = [name for name, was in input_files(plan).items() if readable_checksum(was) is None]
     return present_paths(plan, recorded or {}, output, gone)
 
 

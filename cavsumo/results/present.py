@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 
 from cavsumo.agents.names import policy_file
 from cavsumo.errors import InputError
-from cavsumo.model.checksums import checksum
+from cavsumo.model.checksums import checksum, readable_checksum
 from cavsumo.model.scenario import BatchPlan
 from cavsumo.results.inputs import inputs_folder, unpacked
 
@@ -91,23 +91,23 @@ def _given(wanted: _Wanted, file: Path) -> Path:
     """The file that is said to be the wanted one."""
     if not file.is_file():
         raise InputError(f"{wanted.option}: no such file: {str(file)!r}")
-    if checksum(file) != wanted.sha:
-        raise _another(wanted, file)
+    if (sha := checksum(file)) != wanted.sha:
+        raise _another(wanted, file, sha)
     return file
 
 
 def _found(wanted: _Wanted, way_out: str) -> Path:
     """The wanted file where it was, beside the results or among their inputs."""
     places = (wanted.was, wanted.results.parent / wanted.was.name)
-    there = [file for file in places if file.is_file()]
-    for file in there:
-        if checksum(file) == wanted.sha:
+    sums = {file: sha for file in places if (sha := readable_checksum(file)) is not None}
+    for file, sha in sums.items():
+        if sha == wanted.sha:
             return file
     kept = unpacked(inputs_folder(wanted.results), wanted.sha)
     if kept is not None:
         return kept
-    if there:
-        raise _another(wanted, there[0])
+    if sums:
+        raise _another(wanted, *next(iter(sums.items())))
     option = wanted.option
     how = f"name it with {option} FILE or put it" if option.startswith("--") else "put it"
     without = way_out if option == "--routes" else ""
@@ -116,9 +116,9 @@ def _found(wanted: _Wanted, way_out: str) -> Path:
     )
 
 
-def _another(wanted: _Wanted, file: Path) -> InputError:
+def _another(wanted: _Wanted, file: Path, sha: str) -> InputError:
     """The refusal of a file with another checksum."""
     return InputError(
-        f"{wanted.option} {str(file)!r}: sha256 {checksum(file)[:12]}, not the {wanted} of "
+        f"{wanted.option} {str(file)!r}: sha256 {sha[:12]}, not the {wanted} of "
         f"{str(wanted.results)!r}"
     )

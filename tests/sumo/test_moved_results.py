@@ -6,11 +6,15 @@ The network and the routes are deleted where they were, and the working folder i
 from __future__ import annotations
 
 import csv
+import errno
 import json
+import os
 import re
 import shutil
 from collections.abc import Iterator
+from functools import partial
 from pathlib import Path
+from typing import Any
 
 import pytest
 from support import content, rows, traces
@@ -23,6 +27,7 @@ from cavsumo.results.reading import FIRST, read_manifest
 RUN = 1  # which the ego fails
 PLAYED = ("run", "--net", "networks/crossing.net.xml", "--runs", "2", "--trace", "all")
 QUIET = ("-q", "--exit-zero")
+PARTS = ("part1", "part2")
 # The header of version 0.1.
 OLD = (
     "run,agent,ego,testers,reset,embodiment,sumo_width_m,seed,forecast,forecast_value,outcome,"
@@ -66,6 +71,49 @@ def elsewhere(tmp_path: Path, moved: Path, monkeypatch: pytest.MonkeyPatch) -> I
     monkeypatch.chdir(tmp_path)
     yield tmp_path
     assert content(moved) == before
+
+
+@pytest.fixture
+def closed(moved: Path, elsewhere: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """The results, of files that lay in a folder which is closed to this user."""
+    folder = elsewhere / "theirs"
+    for file in (_copied(moved, elsewhere), *map(partial(_copied, moved, elsewhere), PARTS)):
+        for text in (file.with_suffix(".json"), *file.with_suffix("").glob("run*.jsonl")):
+            found = text.read_text("utf-8")
+            for sort in ("networks", "routes"):
+                found = found.replace(f'"{sort}/crossing.', f'"{folder}/{sort}/crossing.')
+            text.write_text(found, "utf-8")
+    stat = os.stat
+
+    def refused(path: Any, *args: Any, **how: Any) -> os.stat_result:
+        if not isinstance(path, int) and Path(os.fsdecode(path)).is_relative_to(folder):
+            raise PermissionError(errno.EACCES, os.strerror(errno.EACCES), path)
+        return stat(path, *args, **how)
+
+    monkeypatch.setattr(os, "stat", refused)
+    return elsewhere / "results.csv"
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        "replay results.csv 1",
+        "replay results/run000001.jsonl --playback",
+        "replay results.csv 1 --recorded --html page.html",
+        "report results.csv --html report.html -o t.txt",
+        "certify results.csv 1 --runs 1 -q --exit-zero",
+        "merge part1.csv part2.csv -o whole.csv -q",
+        "run --resume -o results.csv --runs 3 -q --exit-zero",
+    ],
+)
+def test_the_old_folder_may_be_closed_to_this_user(
+    closed: Path, capsys: pytest.CaptureFixture[str], words: str
+) -> None:
+    """Somebody else's home: the inputs carried are used, and nothing is said."""
+    assert main(words.split()) == 0
+    said = capsys.readouterr().err
+    assert "denied" not in said
+    assert "without" not in said
 
 
 @pytest.mark.parametrize("words", [(), ("--playback",), ("--recorded",)])
@@ -186,9 +234,12 @@ def test_an_edited_network_is_not_continued_on(
 
 
 def test_weights_are_carried(
-    networks: dict[str, Path], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    networks: dict[str, Path],
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
 ) -> None:
-    """What an agent learned elsewhere: replayed, and its seeds are still excluded."""
+    """What an agent learned elsewhere: replayed, shown and its seeds are still excluded."""
     words = ["run", "--net", str(networks["pedestrians"]), "--routes", "none", "--end", "5"]
     words += ["--agent", "q-learning", "--runs", "2", *QUIET]
     school, late = tmp_path / "school", tmp_path / "late"
@@ -197,10 +248,16 @@ def test_weights_are_carried(
     monkeypatch.chdir(school)
     assert main([*words, "-o", "school.csv"]) == 0
     param = ["--param", "weights=school.json", "--seed", "5", "-o", "../late/results.csv"]
+    param += ["--trace", "all"]
     assert main([*words, *param]) == 0
     monkeypatch.chdir(late)
     shutil.rmtree(school)
-    assert main(["replay", "results.csv", "1"]) == 0
+    capsys.readouterr()
+    for how in ([], ["--playback"], ["--recorded", "--html", "page.html"]):
+        assert main(["replay", "results.csv", "1", *how]) == 0
+    assert main(["report", "results.csv", "--html", "report.html", "-o", "t.txt"]) == 0
+    said = capsys.readouterr().err.splitlines()
+    assert [line for line in said if not line.startswith("cavsumo: wrote ")] == []
     certify = ["certify", "results.csv", "q-learning", "--runs", "1", "-q", "--exit-zero"]
     assert main(certify) == 0
     found = used([Path("results.csv")], {})
