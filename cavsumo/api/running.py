@@ -63,6 +63,7 @@ def run(
         KeyboardInterrupt: the user stopped it; finished rows are in ``output``.
     """
     given, objects = settings_of(net, settings)
+    places = net.places if isinstance(net, Scenario) else {}
     if config is not None:
         given = overruled(read_config(Path(config)), given)
     manner = Manner(resume, retry_errors, overwrite, quiet=not (progress and is_shown()))
@@ -70,11 +71,11 @@ def run(
     if output is None and (resume or retry_errors):
         raise InputError("run: resume and retry_errors go on with an output; none is given")
     if output is not None:
-        _play(given, Path(output), means, manner)
+        _play(given, places, Path(output), means, manner)
         return Results(Path(output), trusted=True, objects=tuple(objects))
     folder = TemporaryFolder()
     try:
-        _play(given, folder.path / FILE, means, manner)
+        _play(given, places, folder.path / FILE, means, manner)
     except BaseException:
         folder.close()
         raise
@@ -88,9 +89,15 @@ def _means(jobs: int | None, executor: Any, scheduler: str | None) -> Means:
     return Means(jobs, "local" if scheduler is None else "dask", scheduler)
 
 
-def _play(settings: Mapping[str, Any], file: Path, means: Means, manner: Manner) -> None:
-    """Play a batch into a file."""
-    (batch,) = checked([Part("", dict(settings), {"net": DEFAULT})], file, manner)
+def _play(
+    settings: Mapping[str, Any],
+    places: Mapping[str, Path],
+    file: Path,
+    means: Means,
+    manner: Manner,
+) -> None:
+    """Play a batch into a file; ``places`` as in ``Scenario.placed``."""
+    (batch,) = checked([Part("", dict(settings), {"net": DEFAULT})], file, manner, places)
     said = ", ".join(f"{key}={value!r}" for key, value in settings.items())
     manifest = {**batch.manifest, "command": [], "call": f"cavsumo.run({said})"}
     _, interrupted = played([replace(batch, manifest=manifest)], means, manner)

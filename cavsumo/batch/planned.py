@@ -13,11 +13,10 @@ from typing import Any
 from cavsumo.batch.manner import Manner
 from cavsumo.batch.plan_names import check_names
 from cavsumo.errors import InputError, ResultsError
-from cavsumo.model.checksums import readable_checksum
 from cavsumo.model.scenario import BatchPlan, plan_from
 from cavsumo.model.study import Part
 from cavsumo.network.network_file import root_of
-from cavsumo.results.present import input_files, present_paths
+from cavsumo.results.present import gone, present_paths
 from cavsumo.results.reading import check_replaceable, read_manifest
 from cavsumo.results.writing import check_free
 
@@ -106,8 +105,7 @@ def _moved(recorded: Mapping[str, Any] | None, output: Path) -> dict[str, Path]:
         plan = BatchPlan.model_validate((recorded or {})["plan"])
     except (KeyError, ValueError):  # a new batch, or none to go on with
         return {}
-    gone = [name for name, was in input_files(plan).items() if readable_checksum(was) is None]
-    return present_paths(plan, recorded or {}, output, gone)
+    return present_paths(plan, recorded or {}, output, gone(plan))
 
 
 def recorded_settings(recorded: Mapping[str, Any] | None) -> dict[str, Any]:

@@ -7,6 +7,7 @@ path, and that only where the file there is the recorded one.
 
 from __future__ import annotations
 
+import contextlib
 from collections.abc import Collection, Mapping
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -14,7 +15,7 @@ from typing import Any, NamedTuple
 from cavsumo.agents.names import policy_file
 from cavsumo.errors import InputError
 from cavsumo.model.checksums import checksum, readable_checksum
-from cavsumo.model.scenario import BatchPlan
+from cavsumo.model.scenario import BatchPlan, Scenario
 from cavsumo.results.inputs import inputs_folder, unpacked
 
 
@@ -64,6 +65,24 @@ def present_paths(
             if place != was:
                 found[name] = place
     return found
+
+
+def gone(plan: BatchPlan) -> list[str]:
+    """The names of the files of a plan that cannot be read where they were."""
+    return [name for name, was in input_files(plan).items() if readable_checksum(was) is None]
+
+
+def placed_scenario(plan: BatchPlan, origin: Mapping[str, Any], file: Path) -> Scenario:
+    """The scenario of a recorded plan, to be played again: gone files are those of the results.
+
+    A file that is nowhere keeps its name, so that playing it is refused.
+    """
+    scenario, found = plan.scenario, dict[str, Path]()
+    own = {str(path) for path in (scenario.net, scenario.routes, *scenario.additional)}
+    for name in own.intersection(gone(plan)):
+        with contextlib.suppress(InputError):
+            found |= present_paths(plan, origin, file, [name])
+    return scenario.placed(found)
 
 
 class _Wanted(NamedTuple):

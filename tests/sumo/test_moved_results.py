@@ -145,6 +145,18 @@ def test_python_plays_them_too(moved: Path, elsewhere: Path) -> None:
     assert len(results.replay(RUN, recorded=True).frames) > 0
 
 
+def test_python_plays_the_scenario_again(moved: Path, elsewhere: Path) -> None:
+    """On the network that the results carry; without it, the file is named."""
+    results = cavsumo.load(moved / "results.csv")
+    again = cavsumo.run(results.scenario, runs=2, trace="all", progress=False)
+    assert rows(again.file) == rows(results.file)
+    assert again.manifest["plan"]["scenario"] == results.manifest["plan"]["scenario"]
+    bare = _copied(moved, elsewhere)
+    shutil.rmtree(elsewhere / "results" / "inputs")
+    with pytest.raises(cavsumo.InputError, match="no such file"):
+        cavsumo.run(cavsumo.load(bare).scenario, runs=1)
+
+
 def test_a_report_has_its_pages(
     moved: Path, elsewhere: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
