@@ -6,9 +6,10 @@ which the agents are built where they play.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 from cavsumo.agents.base import AGENTS, Agent
 from cavsumo.agents.names import PREFIX, policy_file
@@ -55,10 +56,12 @@ class Cast:
     Attributes:
         members: in the order in which they take turns.
         agents_each: how many agents of a member play in an episode, one for each team.
+        bodies_each: how many bodies each of them owns.
     """
 
     members: tuple[CastMember, ...]
     agents_each: int
+    bodies_each: int
 
     def __iter__(self) -> Iterator[CastMember]:
         return iter(self.members)
@@ -85,6 +88,23 @@ class Cast:
         member = self[label]
         return [member.make() for _ in range(self.agents_each)]
 
+    def check_memory(self, label: str, memory: Sequence[Any] | None, source: str) -> None:
+        """Raise InputError unless the agents of a label can have known this before an episode.
+
+        Args:
+            memory: the knowledge of each of them; None for none.
+            source: names its file.
+        """
+        agents = [] if memory is None else self.agents(label)
+        wrong = InputError(f"{source}: is not what agent {label} can have known")
+        if len(agents) != len(memory or ()):
+            raise wrong
+        for agent, known in zip(agents, memory or (), strict=True):
+            try:
+                agent.check_memory(known, self.bodies_each)
+            except Exception as error:  # also of a user's class, of any sort
+                raise wrong from error
+
 
 def resolve_cast(plan: BatchPlan) -> Cast:
     """Build every agent once and account for every parameter; raises InputError."""
@@ -101,7 +121,7 @@ def resolve_cast(plan: BatchPlan) -> Cast:
         except ValueError as error:
             raise InputError(f"agent {label}: {error}") from error
         members.append(_member(plan, label, agent, *present))
-    return Cast(tuple(members), len(teams(plan.scenario)))
+    return Cast(tuple(members), len(teams(plan.scenario)), each)
 
 
 def _present(plan: BatchPlan, label: str) -> tuple[str, Params]:

@@ -120,6 +120,7 @@ def prepare(plan: BatchPlan, ego: Ego | None = None) -> PreparedBatch:
     cast = resolve_cast(plan)
     for member in cast:
         member.make().prepare()
+        cast.check_memory(member.label, (plan.known or {}).get(member.label), "known")
     assertions_of(scenario)
     kind = kind_named(scenario.kind)
     _check_kind(scenario, kind, cast)

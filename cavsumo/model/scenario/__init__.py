@@ -11,6 +11,7 @@ from cavsumo.model.scenario.parsing import (
     SCENARIO_KEYS,
     SENSOR_KEYS,
     check_keys,
+    check_teams,
     plan_from,
 )
 from cavsumo.model.scenario.plan import (
@@ -34,6 +35,7 @@ __all__ = [
     "Scenario",
     "Simulation",
     "check_keys",
+    "check_teams",
     "half_width",
     "part_of",
     "plan_from",

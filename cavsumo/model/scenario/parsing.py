@@ -68,10 +68,15 @@ def _check_together(plan: BatchPlan, source: str) -> None:
             f"{source}: a shard sees its own rows only; first, until_tests and until_half_width "
             "need the whole batch"
         )
-    if plan.scenario.testers % plan.scenario.bodies_per_agent:
+    check_teams(plan.scenario, source)
+
+
+def check_teams(scenario: Scenario, source: str) -> None:
+    """Refuse testers that cannot be divided among agents."""
+    if scenario.testers % scenario.bodies_per_agent:
         raise InputError(
-            f"{source}: bodies_per_agent {plan.scenario.bodies_per_agent} does not divide "
-            f"testers {plan.scenario.testers}"
+            f"{source}: bodies_per_agent {scenario.bodies_per_agent} does not divide "
+            f"testers {scenario.testers}"
         )
 
 
