@@ -14,8 +14,9 @@ from typing import Any
 from cavsumo.agents.base import AGENTS, Agent
 from cavsumo.agents.names import PREFIX, policy_file
 from cavsumo.agents.policy import make_agent, parameters_of
-from cavsumo.errors import InputError, UnknownName
+from cavsumo.errors import InputError
 from cavsumo.model.bodies import Body, kind_named, model_of
+from cavsumo.model.names import check_shared
 from cavsumo.model.objects import is_here, is_object
 from cavsumo.model.plugins import source_file
 from cavsumo.model.scenario import BatchPlan, Params, Scenario
@@ -201,9 +202,4 @@ def tester_bodies(scenario: Scenario) -> tuple[Body, ...]:
 def _check_parameters(plan: BatchPlan) -> None:
     """Refuse parameters that no agent of the plan has."""
     known = {label: [p.name for p in parameters_of(name)] for label, name in plan.cast.items()}
-    shared = {key for keys in known.values() for key in keys}
-    qualified = {f"{label}.{key}" for label, keys in known.items() for key in keys}
-    for key in plan.params:
-        valid = qualified if "." in key else shared
-        if key not in valid:
-            raise UnknownName("parameter", key, valid, f"agent {' '.join(plan.agents)}")
+    check_shared(plan.params, known, f"agent {' '.join(plan.agents)}")
