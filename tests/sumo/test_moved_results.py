@@ -277,6 +277,36 @@ def test_weights_are_carried(
     assert [str(file) for file in found.results] == ["results.csv", "school.csv"]
 
 
+def test_files_that_only_sumo_knows_of_are_named(
+    networks: dict[str, Path],
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    """They are not kept: the batch says so, a replay elsewhere has them put beside the results."""
+    home, away = tmp_path / "home", tmp_path / "away"
+    home.mkdir()
+    monkeypatch.chdir(home)
+    (home / "more.add.xml").write_text(
+        '<additional><include href="types.add.xml"/>'
+        '<e1Detector id="d" lane="westbound_1" pos="5" file="out.xml"/></additional>'
+    )
+    (home / "types.add.xml").write_text('<additional><vType id="x" vClass="bus"/></additional>')
+    words = ["run", "-n", str(networks["pedestrians"]), "-r", "none", "-a", "more.add.xml"]
+    assert main([*words, "--end", "5", "--runs", "1", "-o", "results.csv", *QUIET]) == 0
+    assert capsys.readouterr().err == (
+        "cavsumo: 'more.add.xml' has SUMO read 'types.add.xml', which the results do not keep: a "
+        "replay elsewhere needs both beside them\n"
+    )
+    home.rename(away)
+    monkeypatch.chdir(tmp_path)
+    (away / "more.add.xml").rename(tmp_path / "more.add.xml")
+    assert main(["replay", "away/results.csv", "0"]) == 2
+    assert "types.add.xml" in capsys.readouterr().err
+    (tmp_path / "more.add.xml").rename(away / "more.add.xml")
+    assert main(["replay", "away/results.csv", "0"]) == 0
+
+
 # Of version 0.1
 
 
