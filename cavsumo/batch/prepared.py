@@ -26,6 +26,7 @@ from cavsumo.errors import InputError
 from cavsumo.model.bodies import WALKING, Kind, kind_named
 from cavsumo.model.objects import SentObject, objects_among
 from cavsumo.model.scenario import BatchPlan, Scenario
+from cavsumo.model.visible_files import is_visible
 from cavsumo.network.site import Site, Wishes, derive_site
 from cavsumo.network.traffic import Volume
 from cavsumo.network.traffic_lights import Pace
@@ -84,12 +85,23 @@ class PreparedBatch:
 
         Files that the ego may have written since are not inputs (``ego_files``).
         """
+        self._check_copies()
         found = {**versions(), **checksums(self.plan.scenario, self.cast.files)}
         free = self._written_here()
         for name, (there, here) in unequal({**self.versions, **self.checksums}, found):
             if name in free or (there is None and name not in self.versions):
                 continue
             raise InputError(f"{name} is {here} in the process that simulates, expected {there}")
+
+    def _check_copies(self) -> None:
+        """Refuse copies of moved files that this process does not see, such as a dask worker's."""
+        for name, place in self.plan.scenario.places.items():
+            if not is_visible(place):
+                raise InputError(
+                    f"{name!r} is not at {str(place)!r} for the process that simulates: it was "
+                    "unpacked from the results for this machine alone; put the file where it was, "
+                    "where all processes see it"
+                )
 
     def _written_here(self) -> set[str]:
         """The files of the ego that may have changed on this machine."""

@@ -21,6 +21,7 @@ from support import content, rows, traces
 
 import cavsumo
 from cavsumo.batch.certify.used_seeds import used
+from cavsumo.batch.prepared import PreparedBatch
 from cavsumo.cli import main
 from cavsumo.results.reading import FIRST, read_manifest
 
@@ -230,6 +231,32 @@ def test_a_batch_is_continued(moved: Path, elsewhere: Path, tmp_path: Path) -> N
     heads = [json.loads(text.partition("\n")[0]) for text in after.values()]
     assert len({json.dumps((head["plan"]["scenario"], head["sha256"])) for head in heads}) == 1
     assert _inputs(file) == _inputs(moved / "results.csv")
+
+
+def test_a_process_elsewhere_says_that_it_does_not_see_the_copies(
+    moved: Path,
+    elsewhere: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    """A dask worker on another machine: one sentence with the name and the remedy."""
+    file = _copied(moved, elsewhere)
+    here = PreparedBatch.check_here
+
+    def on_another_machine(prepared: PreparedBatch) -> None:
+        for place in prepared.plan.scenario.places.values():
+            place.rename(place.with_suffix(".away"))
+        try:
+            here(prepared)
+        finally:
+            for place in prepared.plan.scenario.places.values():
+                place.with_suffix(".away").rename(place)
+
+    monkeypatch.setattr(PreparedBatch, "check_here", on_another_machine)
+    assert main(["run", "--resume", "-o", str(file), "--runs", "3", *QUIET]) == 2
+    said = capsys.readouterr().err
+    assert said.startswith("cavsumo: 'networks/crossing.net.xml' is not at ")
+    assert said.endswith("put the file where it was, where all processes see it\n")
 
 
 def test_an_edited_network_is_not_continued_on(
