@@ -15,7 +15,7 @@ from multiprocessing.connection import Connection
 from typing import TYPE_CHECKING
 
 from cavsumo.batch.messages import Reply, Task
-from cavsumo.errors import CavsumoError
+from cavsumo.errors import CavsumoError, plain
 from cavsumo.model.objects import take
 from cavsumo.model.offspring import adopt_orphans, kill_descendants
 from cavsumo.model.processes import end_with_parent
@@ -55,7 +55,7 @@ def _serve(pipe: Connection, first: Task) -> None:
             runner = stack.enter_context(EpisodeRunner(prepared))
             runner.try_out(strict=first.strict)
         except (CavsumoError, OSError) as error:
-            pipe.send(Reply("refused", str(error)))
+            pipe.send(Reply("refused", plain(error)))
             return
         pipe.send(Reply("ready"))
         _play(pipe, runner, prepared.plan.deadline_s)

@@ -8,7 +8,7 @@ from typing import Any
 
 from pydantic import ValidationError
 
-from cavsumo.errors import InputError, UnknownName, shown
+from cavsumo.errors import InputError, UnknownName, plain, shown
 from cavsumo.model.documents import first_problem
 from cavsumo.model.named_networks import check_network, is_named, routes_of
 from cavsumo.model.scenario.fields import settings as offered
@@ -16,6 +16,7 @@ from cavsumo.model.scenario.plan import BatchPlan
 from cavsumo.model.scenario.record import Scenario
 from cavsumo.model.scenario.sensor import Sensor
 from cavsumo.model.sumo_configuration import with_configuration
+from cavsumo.model.visible_files import is_visible
 
 SCENARIO_KEYS = frozenset(Scenario.model_fields)
 PLAN_KEYS = frozenset(BatchPlan.model_fields) - {"scenario"}
@@ -61,8 +62,11 @@ def plan_from(
 def _check_together(plan: BatchPlan, source: str) -> None:
     """Refuse files that are not there, and settings that do not go together."""
     for file in (plan.scenario.routes_file, *plan.scenario.additional_files):
-        if file is not None and not file.is_file():
-            raise InputError(f"{source}: no such file: {str(file)!r}")
+        try:
+            if file is not None and not file.is_file():
+                raise InputError(f"{source}: no such file: {str(file)!r}")
+        except OSError as error:
+            raise InputError(f"{source}: {plain(error)}") from error
     if plan.shard and (plan.first or plan.until_tests or plan.until_half_width):
         raise InputError(
             f"{source}: a shard sees its own rows only; first, until_tests and until_half_width "
@@ -111,7 +115,7 @@ def _route_file(scenario: Mapping[str, Any], source: str) -> Path | None:
     stem = net.name.removesuffix(".gz").removesuffix(".xml").removesuffix(".net")
     for folder in (net.parent.parent / "routes", net.parent):
         file = folder / f"{stem}.rou.xml"
-        if file.is_file():
+        if is_visible(file):
             return file
     return None
 
