@@ -59,6 +59,19 @@ def routes_of(name: Path) -> Path | None:
     return routes if routes_file(routes).is_file() else None
 
 
+def named_routes(routes: Path, source: str = "") -> Path:
+    """The demand of the network of that name as plans hold it, or the path itself.
+
+    Raises UnknownName for a word that is neither a file nor the name of a network with a demand.
+    """
+    if not is_word(routes) or is_visible(routes):
+        return routes
+    found = routes_of(routes) if is_named(routes) else None
+    if found is None:
+        raise UnknownName("routes", str(routes), [n for n in names() if routes_of(Path(n))], source)
+    return found
+
+
 def routes_file(routes: Path) -> Path:
     """The file of the demand of a named network, or the path itself."""
     named = routes.parent == ROUTES and not is_visible(routes)

@@ -14,6 +14,10 @@ from cavsumo.model.scenario import check_keys
 
 VARY = "vary"  # the table that makes a study of a scenario file
 PATH_KEYS = ("net", "routes", "additional")
+NAMED_KEYS = (
+    "net",
+    "routes",
+)  # of those, what may be the name of a network that comes with cavsumo
 
 
 def read_config(file: Path) -> dict[str, Any]:
@@ -48,7 +52,7 @@ def _resolved(key: str, value: Any, folder: Path) -> Any:
     if isinstance(value, list):
         return [str(folder / str(v)) for v in value]
     file = folder / str(value)
-    if key == "net" and not file.is_file():
+    if key in NAMED_KEYS and not file.is_file():
         word = Path(str(value))
         if is_named(word) or (is_word(word) and not file.exists()):
             return str(value)

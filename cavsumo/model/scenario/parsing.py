@@ -10,7 +10,7 @@ from pydantic import ValidationError
 
 from cavsumo.errors import InputError, UnknownName, plain, shown
 from cavsumo.model.documents import first_problem
-from cavsumo.model.named_networks import check_network, is_named, routes_of
+from cavsumo.model.named_networks import check_network, is_named, named_routes, routes_of
 from cavsumo.model.scenario.fields import settings as offered
 from cavsumo.model.scenario.plan import BatchPlan
 from cavsumo.model.scenario.record import Scenario
@@ -47,7 +47,7 @@ def plan_from(
     scenario = {k: v for k, v in settings.items() if k in SCENARIO_KEYS}
     if str(scenario.get("traffic")) == "none":
         del scenario["traffic"]
-    scenario["routes"] = _route_file(scenario, source)
+    scenario["routes"] = _route_file(scenario, places, source)
     try:
         plan = BatchPlan(
             scenario=Scenario(**scenario).placed(places),
@@ -96,7 +96,9 @@ def check_keys(settings: Mapping[str, Any], source: str) -> None:
                 raise UnknownName(f"key of {sensor}", key, Sensor.model_fields, source)
 
 
-def _route_file(scenario: Mapping[str, Any], source: str) -> Path | None:
+def _route_file(
+    scenario: Mapping[str, Any], places: Mapping[str, Path], source: str
+) -> Path | None:
     """The route file named, the one belonging to the network, or None.
 
     Traffic that is drawn takes the place of the one that would be found, not of one that is named.
@@ -108,7 +110,9 @@ def _route_file(scenario: Mapping[str, Any], source: str) -> Path | None:
             f"{shown(scenario['traffic'])}, not both; routes none or traffic none leaves one"
         )
     if given is not None or drawn:
-        return None if given is None or str(given) == "none" else Path(given)
+        if given is None or str(given) == "none":
+            return None
+        return Path(given) if str(given) in places else named_routes(Path(given), source)
     net = Path(scenario["net"])
     if is_named(net):
         return routes_of(net)
