@@ -18,7 +18,7 @@ def located(
     """The record with the present paths of its files.
 
     Args:
-        net, routes: where the network and the routes are; those of cavsumo are found by their names.
+        net, routes: where the network and the routes are; cavsumo's are found by their names.
         shown: the episode is not played, so that the network is enough.
 
     Raises InputError for a missing or different file.

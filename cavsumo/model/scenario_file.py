@@ -14,17 +14,16 @@ from cavsumo.model.scenario import check_keys
 
 VARY = "vary"  # the table that makes a study of a scenario file
 PATH_KEYS = ("net", "routes", "additional")
-NAMED_KEYS = (
-    "net",
-    "routes",
-)  # of those, what may be the name of a network that comes with cavsumo
+NAMED_KEYS = ("net", "routes")  # of those, what may be the name of a network of cavsumo's
 
 
 def read_config(file: Path) -> dict[str, Any]:
     """The settings of a scenario file (TOML) that describes one scenario."""
     data = read_toml(file)
     if VARY in data:
-        raise InputError(f"config {str(file)!r}: [{VARY}] makes several of it; expected one")
+        raise InputError(
+            f"config {str(file)!r}: [{VARY}] makes several batches of it; cavsumo.run_study plays them"
+        )
     return settings_in(data, file)
 
 
