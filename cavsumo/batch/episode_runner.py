@@ -13,7 +13,7 @@ from cavsumo.batch.jobs import Job, Memory, finished
 from cavsumo.batch.messages import Answer
 from cavsumo.batch.prepared import PreparedBatch
 from cavsumo.egos.reference import IDEAL, REFERENCES
-from cavsumo.errors import CavsumoError, EgoError
+from cavsumo.errors import CavsumoError, EgoError, plain
 from cavsumo.model.objects import is_instance
 from cavsumo.model.seeds import episode_seed
 from cavsumo.results.columns import Row, row_of
@@ -109,7 +109,8 @@ class EpisodeRunner:
             row = row_of(finished(self.plan, job, episode, avoidability))
             trace = self._trace(job, row, before, episode) if record else b""
         except Exception as error:  # any error costs this row and no other
-            said = str(error) if isinstance(error, CavsumoError) else f"defect: {error!r}"
+            known = isinstance(error, CavsumoError | OSError)
+            said = plain(error) if known else f"defect: {error!r}"
             row, trace = row_of(finished(self.plan, job, error=said)), b""
             memory, judged = job.memory, True
         finally:

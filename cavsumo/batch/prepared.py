@@ -26,6 +26,7 @@ from cavsumo.errors import InputError
 from cavsumo.model.bodies import WALKING, Kind, kind_named
 from cavsumo.model.objects import SentObject, objects_among
 from cavsumo.model.scenario import BatchPlan, Scenario
+from cavsumo.model.visible_files import is_visible
 from cavsumo.network.site import Site, Wishes
 from cavsumo.network.site_cache import site_of
 from cavsumo.network.traffic import Volume
@@ -85,12 +86,23 @@ class PreparedBatch:
 
         Files that the ego may have written since are not inputs (``ego_files``).
         """
+        self._check_copies()
         found = {**versions(), **checksums(self.plan.scenario, self.cast.files)}
         free = self._written_here()
         for name, (there, here) in unequal({**self.versions, **self.checksums}, found):
             if name in free or (there is None and name not in self.versions):
                 continue
             raise InputError(f"{name} is {here} in the process that simulates, expected {there}")
+
+    def _check_copies(self) -> None:
+        """Refuse copies of moved files that this process does not see, such as a dask worker's."""
+        for name, place in self.plan.scenario.places.items():
+            if not is_visible(place):
+                raise InputError(
+                    f"{name!r} is not at {str(place)!r} for the process that simulates: it was "
+                    "unpacked from the results for this machine alone; put the file where it was, "
+                    "where all processes see it"
+                )
 
     def _written_here(self) -> set[str]:
         """The files of the ego that may have changed on this machine."""
@@ -121,6 +133,7 @@ def prepare(plan: BatchPlan, ego: Ego | None = None) -> PreparedBatch:
     cast = resolve_cast(plan)
     for member in cast:
         member.make().prepare()
+        cast.check_memory(member.label, (plan.known or {}).get(member.label), "known")
     assertions_of(scenario)
     kind = kind_named(scenario.kind)
     _check_kind(scenario, kind, cast)

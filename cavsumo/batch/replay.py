@@ -145,6 +145,8 @@ def _played_again(worker: Worker, record: Record) -> Answer:
     plan, run = worker.prepared.plan, record.run
     if record.alone and record.trace is not None:
         row, memory = record.row, record.trace.head["memory"]
+        source = f"trace {str(record.file)!r}: memory"
+        worker.prepared.cast.check_memory(row["agent"], memory, source)
         again = Job(run, row["agent"], int(row["seed"]), memory, record=True)
         return worker.play(again)
     return worker.play(dataclasses.replace(job(plan, run, known(worker, run)), record=True))

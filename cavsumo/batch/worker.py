@@ -23,7 +23,7 @@ from multiprocessing.connection import Connection
 from cavsumo.batch.jobs import Job, failed
 from cavsumo.batch.messages import Answer, Reply, Task
 from cavsumo.batch.prepared import PreparedBatch
-from cavsumo.errors import BatchError, InputError
+from cavsumo.errors import BatchError, InputError, plain
 from cavsumo.model.offspring import kill_descendants
 from cavsumo.model.own_folders import OwnFolder, sweep_once
 from cavsumo.model.processes import by_a_lasting_thread, ending, inner_environment, last_words
@@ -148,7 +148,7 @@ class Worker:
             self._process = by_a_lasting_thread(lambda: self._started(fds, environment))
         except OSError as error:
             raise InputError(
-                f"cannot start a process in {self.prepared.folder!r}: {error}"
+                f"cannot start a process in {self.prepared.folder!r}: {plain(error)}"
             ) from error
         finally:
             theirs.close()  # so that its death is seen as the end of the pipe

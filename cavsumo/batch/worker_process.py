@@ -16,7 +16,7 @@ from multiprocessing.connection import Connection
 from typing import TYPE_CHECKING
 
 from cavsumo.batch.messages import Reply, Task
-from cavsumo.errors import CavsumoError
+from cavsumo.errors import CavsumoError, plain
 from cavsumo.model.fork_child import ALARM_AFTER_S, places
 from cavsumo.model.objects import take
 from cavsumo.model.offspring import adopt_orphans, kill_descendants
@@ -58,7 +58,7 @@ def _serve(pipe: Connection, first: Task, log: int) -> None:
             runner = stack.enter_context(EpisodeRunner(prepared))
             runner.try_out(strict=first.strict)
         except (CavsumoError, OSError) as error:
-            pipe.send(Reply("refused", str(error)))
+            pipe.send(Reply("refused", plain(error)))
             return
         gc.collect()
         gc.freeze()  # what is there now stays: it need not be looked through again and again

@@ -22,7 +22,7 @@ from collections.abc import Callable, Generator, Iterable, Mapping
 from functools import cache
 from typing import Any, Generic, TypeVar
 
-from cavsumo.errors import BranchError
+from cavsumo.errors import BranchError, plain
 from cavsumo.model.fork_child import (
     ALARM_AFTER_S,
     CHUNK,
@@ -84,7 +84,7 @@ class Fork(Generic[Result]):
         except OSError as error:
             os.close(self.source)
             os.close(sink)
-            raise BranchError(f"no process for a branch: {error}") from error
+            raise BranchError(f"no process for a branch: {plain(error)}") from error
         if self._pid == 0:
             try:
                 follow_parent()

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -136,10 +136,32 @@ def _apart(first: Batch, second: Batch, by: str) -> Iterator[str]:
     if by == "file":
         return iter(())
     empty: dict[str, Any] = {part: {} for part in COMPARED}
-    left, right = (empty | dict(batch.manifest) for batch in (first, second))
+    left, right = (empty | by_content(batch.manifest) for batch in (first, second))
     if by in WITH_FILES:
         left, right = left | {"sha256": {}}, right | {"sha256": {}}
     return differences(left, right, apart=APART | MEANT.get(by, frozenset()))
+
+
+def by_content(manifest: Mapping[str, Any]) -> dict[str, Any]:
+    """A manifest in which the scenario's files are named by their checksums.
+
+    A network that was given by its name and by its path is then the same one.
+    """
+    sums = dict(manifest.get("sha256") or {})
+    plan = dict(manifest.get("plan") or {})
+    scenario = dict(plan.get("scenario") or {})
+    files = [scenario.get("net"), scenario.get("routes"), *(scenario.get("additional") or ())]
+    named = {file: sums[file] for file in files if file in sums}
+    found = {
+        key: named.get(scenario[key], scenario[key]) for key in ("net", "routes") if key in scenario
+    }
+    if "additional" in scenario:
+        found["additional"] = [named.get(file, file) for file in scenario["additional"]]
+    return {
+        **manifest,
+        "plan": plan | {"scenario": scenario | found},
+        "sha256": {named.get(name, name): sha for name, sha in sums.items()},
+    }
 
 
 def _names(batches: Sequence[Batch], settings: Sequence[int]) -> dict[int, str]:

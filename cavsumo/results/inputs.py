@@ -22,7 +22,7 @@ from collections.abc import Iterator
 from functools import cache
 from pathlib import Path
 
-from cavsumo.errors import ResultsError
+from cavsumo.errors import ResultsError, plain
 from cavsumo.model.own_folders import OwnFolder
 from cavsumo.results.trace_file import is_trace
 
@@ -114,7 +114,7 @@ def unpacked(folder: Path, sha: str) -> Path | None:
         new.replace(file)
     except (OSError, EOFError, ValueError, zlib.error) as error:
         shutil.rmtree(place, ignore_errors=True)
-        raise ResultsError(f"{str(kept)!r}: is damaged: {error}") from error
+        raise ResultsError(f"{str(kept)!r}: is damaged: {plain(error)}") from error
     return file
 
 

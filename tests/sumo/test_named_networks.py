@@ -58,6 +58,28 @@ def test_a_name_plays_what_its_path_plays(
     assert found[0] == found[1]
 
 
+def test_routes_have_the_names_of_their_networks(
+    away: Path, networks: dict[str, Path], routes: dict[str, Path]
+) -> None:
+    """On the command line, in scenario files, in Python and for a replay; a file goes before."""
+    net = str(networks["crossing"])
+    named = plan_from({"net": net, "routes": "crossing"}, "here").scenario
+    assert named.routes == plan_from({"net": "crossing"}, "here").scenario.routes
+    assert named.routes_file == routes["crossing"]
+    (away / "sub").mkdir()
+    (away / "sub" / "c.toml").write_text(f'net = "{net}"\nroutes = "crossing"\n')
+    assert plan_from(read_config(Path("sub/c.toml")), "here").scenario == named
+    assert main(["run", "-n", net, "-r", "crossing", *FEW, "-o", "results.csv"]) == 0
+    shutil.rmtree(away / "results" / "inputs")
+    again = ["replay", "results.csv", "0", "--net", "crossing", "--routes"]
+    assert main([*again, "crossing"]) == 0
+    assert main([*again, "junction"]) == 2
+    with pytest.raises(UnknownName, match="unknown routes 'crosing'; did you mean 'crossing'"):
+        plan_from({"net": net, "routes": "crosing"}, "here")
+    Path("crossing").write_text("<routes/>")
+    assert plan_from({"net": net, "routes": "crossing"}, "here").scenario.routes == Path("crossing")
+
+
 def test_a_recorded_name_is_found_again_anywhere(
     away: Path, monkeypatch: pytest.MonkeyPatch, tmp_path_factory: pytest.TempPathFactory
 ) -> None:

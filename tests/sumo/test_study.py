@@ -159,7 +159,7 @@ def test_the_product_is_pure() -> None:
         ),
         (f"[vary]\nseed = {list(range(1001))}", "1001 batches, at most 1000"),
         (f"[vary]\na = [{{ name = '{'x' * 101}' }}]", "more than 100 characters"),
-        ("[vary]\nruns = [1, 2]", "vary.runs varies runs, which is given on the command line"),
+        ("[vary]\nruns = [1, 2]", "vary.runs varies runs, which is given beside the file"),
     ],
 )
 def test_bad_tables_are_one_sentence_with_the_key(text: str, said: str, write: Write) -> None:

@@ -11,6 +11,7 @@ from cavsumo.model.scenario.parsing import (
     SCENARIO_KEYS,
     SENSOR_KEYS,
     check_keys,
+    check_teams,
     plan_from,
 )
 from cavsumo.model.scenario.plan import (
@@ -30,6 +31,7 @@ __all__ = [
     "Params",
     "Scenario",
     "check_keys",
+    "check_teams",
     "half_width",
     "part_of",
     "plan_from",
