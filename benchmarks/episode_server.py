@@ -159,7 +159,11 @@ def timed(work: Any) -> float:
 
 def leftovers(net: str, many: int) -> None:
     """Print what is left of many episodes in this process."""
-    with serving(net, {"trace": "tests"}, 0.0) as server:
+    with (
+        tempfile.TemporaryDirectory() as folder,
+        mock.patch.object(tempfile, "tempdir", folder),
+        serving(net, {"trace": "tests"}, 0.0) as server,
+    ):
         plan = server.runner.plan
         for run in range(min(many, 20)):
             server.play(job(plan, run), lambda: None)
