@@ -95,17 +95,17 @@ def compared(net: str, name: str, episodes: int) -> bool:
     settings = SETTINGS[name]
     for large in (0.0, float("inf")):
         with serving(net, settings, large) as server:
-            plan, found, times = server._runner.plan, [], []
+            plan, found, times = server.runner.plan, [], []
             for run in range(episodes + 2):
                 before = processor_time()
                 found.append(server.play(job(plan, run), lambda: None))
                 times.append(processor_time() - before)
             if large:
-                world = server._runner.setup.world
+                world = server.runner.setup.world
                 start = statistics.median(timed(world.stand_by) for _ in range(STARTS))
             answers.append(found)
             spent.append(times[2:])  # the first is played here, the second pays for the start
-    same = sum(episode_server._same(a, b) for a, b in zip(*answers, strict=True))
+    same = sum(episode_server.same(a, b) for a, b in zip(*answers, strict=True))
     notes = {answer.note for answer in answers[0] if answer.note}
     forks, starts = (1e3 * statistics.mean(times) for times in spent)
     print(
@@ -159,8 +159,12 @@ def timed(work: Any) -> float:
 
 def leftovers(net: str, many: int) -> None:
     """Print what is left of many episodes in this process."""
-    with serving(net, {"trace": "tests"}, 0.0) as server:
-        plan = server._runner.plan
+    with (
+        tempfile.TemporaryDirectory() as folder,
+        mock.patch.object(tempfile, "tempdir", folder),
+        serving(net, {"trace": "tests"}, 0.0) as server,
+    ):
+        plan = server.runner.plan
         for run in range(min(many, 20)):
             server.play(job(plan, run), lambda: None)
         before, since = held(), time.monotonic()

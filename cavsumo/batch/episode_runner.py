@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import time
 from collections.abc import Callable, Sequence
 from functools import cached_property
@@ -64,15 +65,20 @@ class EpisodeRunner:
         self.setup.world.reset(episode_seed(self.plan.seed, 0), (), ())
 
     def play(
-        self, job: Job, beat: Callable[[], None] = lambda: None, *, judge: bool = True
+        self,
+        job: Job,
+        beat: Callable[[], None] = lambda: None,
+        *,
+        judge: bool = True,
+        digest: bool = False,
     ) -> Answer:
         """Play a job; ``beat`` is called when another simulation begins for it.
 
         ``judge``: judge a failure; else nothing is prepared for that, and a failure that would have
-        to be judged is an answer without a trace that says so.
+        to be judged is an answer without a trace that says so. ``digest``: with a checksum.
         """
         since = time.perf_counter()
-        log, checkpoint = "", None
+        log, seen, checkpoint = "", "", None
         try:
             agents = self.agents_of(job)
             before = _recall(agents)
@@ -86,13 +92,15 @@ class EpisodeRunner:
 
             if job.recorded is not None:
                 episode = played_back(self.setup, job.recorded)
+                history = episode.frames
             else:
                 asked = check if retry and judge else None
                 deadline = self.plan.deadline_s / 2
                 loop, checkpoint = begun(
                     self.setup, agents, job.seed, asked, deadline, record=record, keep=retry
                 )
-                episode = played_on(loop)
+                episode, history = played_on(loop), loop.history
+            seen = hashlib.sha256(repr(history).encode()).hexdigest() if digest else ""
             memory = _recall(agents)
             log = self.setup.ego.take_log()
             avoidability, judged = None, True
@@ -118,7 +126,7 @@ class EpisodeRunner:
                 checkpoint.close()
         row["wall_s"] = time.perf_counter() - since
         said_later = self.setup.ego.take_log()  # of an episode that failed; a rerun's is not kept
-        return Answer(Outcome(row, trace, log or said_later), memory, judged)
+        return Answer(Outcome(row, trace, log or said_later), memory, judged, seen)
 
     def _team(self, label: str) -> tuple[list[Agent], Memory | None]:
         """The agents of a label, and their knowledge when they were built; fresh copies of an agent

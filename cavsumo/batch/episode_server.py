@@ -4,7 +4,7 @@ On a large network the start of SUMO costs far more than an episode. From its se
 process therefore keeps a simulation that stands by, and each job is played in a fork, which makes
 it the job's own (``sumo.connection``). The answers are the same as without: the first job, which
 was played in a simulation that was started for it, is played once more in a fork, and every number
-of its row and its trace is compared.
+of its row and its snapshots is compared.
 
 A fork that crashes or hangs costs one row, and the process goes on. One that ends otherwise, or by
 SUMO's own decision (SIGABRT: an error in a route file, for instance), is played again as without
@@ -19,7 +19,7 @@ import os
 import selectors
 import signal
 import time
-from collections.abc import Callable, Collection
+from collections.abc import Callable, Collection, Mapping, Sequence
 from functools import partial
 
 from cavsumo.batch.episode_runner import EpisodeRunner
@@ -53,7 +53,7 @@ class EpisodeServer:
         streams: tuple[int, int],
         own: Collection[int],
     ) -> None:
-        self._runner, self._deadline, self._own = runner, deadline, own
+        self.runner, self._deadline, self._own = runner, deadline, own
         self._stderr, self._log = streams
         self._small = runner.setup.world.lanes < LARGE
         self._first: tuple[Job, Answer] | None = None  # to be compared before the second job
@@ -68,15 +68,16 @@ class EpisodeServer:
             self._first = None
         if self._forks and not self._unsuited():
             return self._forked(job, beat)
-        answer = dataclasses.replace(self._here(job, beat), note=note)
-        if self._forks is None and not self._small:
+        compared = self._forks is None and not self._small
+        answer = self._here(job, beat, digest=compared)
+        if compared:
             self._first = job, answer
-        return answer
+        return dataclasses.replace(answer, digest="", note=note)
 
-    def _here(self, job: Job, beat: Beat) -> Answer:
+    def _here(self, job: Job, beat: Beat, *, digest: bool = False) -> Answer:
         """The answer of a job that is played without a fork."""
         self._stands_by = False
-        return self._runner.play(job, beat)
+        return self.runner.play(job, beat, digest=digest)
 
     def _compared(self, job: Job, answer: Answer, beat: Beat) -> str:
         """Decide whether jobs are played in forks; the reason if they are not."""
@@ -88,14 +89,14 @@ class EpisodeServer:
             except SimulationError as error:
                 reason = str(error)
             else:
-                again = self._forked(job, beat, shown=False)
-                reason = "" if _same(answer, again) else f"run {job.run} is another one in a fork"
+                again = self._forked(job, beat, compared=True)
+                reason = "" if same(answer, again) else f"run {job.run} is another one in a fork"
         self._forks = not reason
         return reason
 
     def _unsuited(self) -> str:
         """The reason why a job cannot be played in a fork, empty if it can."""
-        setup = self._runner.setup
+        setup = self.runner.setup
         if setup.ego.outside:
             return "the ego is in another process"
         if not can_fork():
@@ -107,26 +108,36 @@ class EpisodeServer:
     def _stand_by(self) -> None:
         """Start a simulation for forks, unless there is one."""
         if not self._stands_by:
-            self._runner.setup.world.stand_by()
+            self.runner.setup.world.stand_by()
             self._stands_by = True
             self._children = frozenset(children(os.getpid()))
             cost_of_fork()  # which forks would measure anew
             gc.collect()
             gc.freeze()  # so that a fork's collections leave the pages shared
 
-    def _forked(self, job: Job, beat: Beat, *, shown: bool = True) -> Answer:
+    def _forked(self, job: Job, beat: Beat, *, compared: bool = False) -> Answer:
         """The answer of a job that is played in a fork, and a failure in another one.
 
         To judge a failure takes the episode at its start once more, for which a second fork is kept
         waiting (``checkpoints``); that would cost most episodes more than it saves the others.
 
-        ``shown``: whether what the users' code prints is printed.
+        ``compared``: with a checksum, and what users' code prints is not printed once more.
         """
-        answer = self._in_fork(job, beat, judge=False, shown=shown)
-        return answer if answer.judged else self._in_fork(job, beat, judge=True, shown=False)
+        first = {"judge": False, "digest": compared}
+        answer = self._in_fork(job, beat, first, [] if compared else [self._stderr])
+        if answer.judged:
+            return answer
+        return self._in_fork(job, beat, {"judge": True, "digest": compared}, [])
 
-    def _in_fork(self, job: Job, beat: Beat, *, judge: bool, shown: bool) -> Answer:
-        """The answer of one fork."""
+    def _in_fork(
+        self, job: Job, beat: Beat, how: Mapping[str, bool], kept: Sequence[int]
+    ) -> Answer:
+        """The answer of one fork.
+
+        Args:
+            how: further arguments of ``EpisodeRunner.play``.
+            kept: descriptors that it keeps.
+        """
         begun = time.perf_counter()
         source, sink = os.pipe()
         try:
@@ -134,8 +145,8 @@ class EpisodeServer:
             self._stand_by()
             os.ftruncate(self._log, 0)
             os.lseek(self._log, 0, os.SEEK_SET)
-            work = partial(_played, self._runner, job, sink, self._deadline, judge)
-            fork = Fork(work, self._deadline, [sink, *[self._stderr] * shown])
+            work = partial(_played, self.runner, job, sink, self._deadline, how)
+            fork = Fork(work, self._deadline, [sink, *kept])
         except (BranchError, SimulationError):  # no process; or SUMO would not start
             os.close(source)
             return self._here(job, beat)
@@ -156,7 +167,7 @@ class EpisodeServer:
         """The answer of a job whose fork has died, after which nothing of the fork is left."""
         kill_strays(self._children)
         wall = time.perf_counter() - begun
-        return Answer(failed(self._runner.plan, job, said, wall), job.memory)
+        return Answer(failed(self.runner.plan, job, said, wall), job.memory)
 
     def _awaited(self, fork: Fork[Answer], source: int, beat: Beat) -> str | None:
         """Wait until a fork has sent all that it will send; a sentence if it takes too long.
@@ -183,18 +194,22 @@ class EpisodeServer:
         return f"no answer within {self._deadline:g} s, killed"
 
 
-def _played(runner: EpisodeRunner, job: Job, sink: int, deadline: float, judge: bool) -> Answer:
+def _played(
+    runner: EpisodeRunner, job: Job, sink: int, deadline: float, how: Mapping[str, bool]
+) -> Answer:
     """The answer of a job, in a fork, which says when another simulation begins."""
 
     def beat() -> None:
         signal.setitimer(signal.ITIMER_REAL, deadline + ALARM_AFTER_S)
         os.write(sink, b".")
 
-    return runner.play(job, beat, judge=judge)
+    return runner.play(job, beat, **how)
 
 
-def _same(first: Answer, second: Answer) -> bool:
-    """Whether two answers are the same but for the real time."""
-    rows = [{**answer.outcome.row, "wall_s": None} for answer in (first, second)]
-    kept = [(a.outcome.trace, a.outcome.ego_log, a.memory) for a in (first, second)]
-    return rows[0] == rows[1] and kept[0] == kept[1]
+def same(first: Answer, second: Answer) -> bool:
+    """Whether two answers are the same but for the real time, to the last digit."""
+    told = [
+        (repr({**a.outcome.row, "wall_s": None}), a.outcome.trace, a.outcome.ego_log, a.digest)
+        for a in (first, second)
+    ]
+    return told[0] == told[1] and first.memory == second.memory

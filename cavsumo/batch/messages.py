@@ -39,6 +39,7 @@ class Answer:
         outcome: its row, trace and log.
         memory: the knowledge of its agents afterwards; None if none of them learns.
         judged: False for a failure that has yet to be judged (``EpisodeRunner.play``).
+        digest: a checksum of all its snapshots, where that was asked for.
         note: why SUMO is started for every episode although the network is large; empty if it is
             not, or if that was said before.
     """
@@ -46,6 +47,7 @@ class Answer:
     outcome: Outcome
     memory: Memory | None = None
     judged: bool = True
+    digest: str = ""
     note: str = ""
 
 

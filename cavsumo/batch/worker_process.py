@@ -18,6 +18,7 @@ from typing import TYPE_CHECKING
 from cavsumo.batch.messages import Reply, Task
 from cavsumo.errors import CavsumoError, plain
 from cavsumo.model.fork_child import ALARM_AFTER_S, places
+from cavsumo.model.forks import can_fork
 from cavsumo.model.objects import take
 from cavsumo.model.offspring import adopt_orphans, kill_descendants
 from cavsumo.model.processes import end_with_parent
@@ -48,7 +49,7 @@ def _serve(pipe: Connection, first: Task, log: int) -> None:
     from cavsumo.batch.episode_runner import EpisodeRunner
     from cavsumo.batch.episode_server import EpisodeServer
 
-    own = frozenset(places())
+    own = frozenset(places() if can_fork() else ())
     prepared = first.batch
     assert prepared is not None
     with contextlib.ExitStack() as stack:
