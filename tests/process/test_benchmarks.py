@@ -238,6 +238,18 @@ def test_shared(play: Play) -> None:
     assert "tests found" in said.splitlines()[-1]
 
 
+def test_speed(play: Play) -> None:
+    """Two episodes of this version beside itself, and the command."""
+    words = ["--net", NET, "--testers", "1", "--episodes", "2", "--rounds", "1"]
+    said = play("speed", *words, "--other", str(ROOT))
+    lines = said.splitlines()
+    assert len(lines) == 3
+    for line in lines[1:]:
+        bare, *others = numbers(line.partition(ROOT.name)[2])
+        assert bare > 0.0
+        assert len(others) == 6  # alone, whole, command, each with its ratio
+
+
 def test_ssm(play: Play) -> None:
     """It has no size: all encounters."""
     assert len(play("ssm").splitlines()) > 3
