@@ -264,6 +264,17 @@ def test_throughput(play: Play) -> None:
     assert "contacts and assertions" in said
 
 
+def test_traces(play: Play) -> None:
+    """One episode of one network."""
+    said = play("traces", "--episodes", "1", "--rounds", "1", NETWORKS=("pedestrians",))
+    lines = said.splitlines()
+    assert lines[0].startswith("pedestrians: 1 traces, ")
+    shares = [numbers(line)[1] for line in lines if "level" in line]
+    assert len(shares) == 5
+    assert shares[0] < 50.0
+    assert shares == sorted(shares, reverse=True)
+
+
 # Experiments --------------------------------------------------------------------------------------
 
 
