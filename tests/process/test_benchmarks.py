@@ -264,6 +264,18 @@ def test_soak(play: Play, capsys: pytest.CaptureFixture[str]) -> None:
     assert "0 errors, 0 after --retry-errors; 0 rows missing, in order: True" in said
 
 
+def test_speed(play: Play) -> None:
+    """Two episodes of this version beside itself, and the command."""
+    words = ["--net", NET, "--testers", "1", "--episodes", "2", "--rounds", "1"]
+    said = play("speed", *words, "--other", str(ROOT))
+    lines = said.splitlines()
+    assert len(lines) == 3
+    for line in lines[1:]:
+        bare, *others = numbers(line.partition(ROOT.name)[2])
+        assert bare > 0.0
+        assert len(others) == 6  # alone, whole, command, each with its ratio
+
+
 def test_ssm(play: Play) -> None:
     """It has no size: all encounters."""
     assert len(play("ssm").splitlines()) > 3
@@ -276,6 +288,17 @@ def test_throughput(play: Play) -> None:
     assert len(shares) == 8
     assert sum(shares) == pytest.approx(100.0, abs=0.5)
     assert "contacts and assertions" in said
+
+
+def test_traces(play: Play) -> None:
+    """One episode of one network."""
+    said = play("traces", "--episodes", "1", "--rounds", "1", NETWORKS=("pedestrians",))
+    lines = said.splitlines()
+    assert lines[0].startswith("pedestrians: 1 traces, ")
+    shares = [numbers(line)[1] for line in lines if "level" in line]
+    assert len(shares) == 5
+    assert shares[0] < 50.0
+    assert shares == sorted(shares, reverse=True)
 
 
 # Experiments --------------------------------------------------------------------------------------
