@@ -38,6 +38,7 @@ from cavsumo.model.bodies import NOOP
 from cavsumo.model.forks import can_fork, cost_of_fork, result_of
 from cavsumo.model.scenario import plan_from
 from cavsumo.simulation import avoidability, checkpoints
+from cavsumo.simulation.avoidability import AvoidabilityCheck
 from cavsumo.simulation.branching import Continuation, branch, branches
 from cavsumo.simulation.loop import Episode, EpisodeLoop, played_on
 
@@ -45,7 +46,7 @@ NETS = ("crossing", "junction", "pedestrians")
 AT = (5, 25, 60)  # timesteps in which episodes are branched
 BRANCH = 30  # timesteps of a branch whose cost is measured
 DEFAULT, ONE = "default", "default without the ideal driver"
-NOBODY = staticmethod(lambda *_: None)
+NOBODY: Callable[..., None] = lambda *_: None  # noqa: E731  # in place of the ideal driver's answer
 OUTSIDE = Path(__file__).resolve().parent.parent / "examples/egos/stop_for_pedestrians.py"
 PREFIXES = (20, 60, 200)
 SLOW = {"ego": "constant", "ego_params": {"speed": 1.0}}  # still on its way after all of them
@@ -141,6 +142,7 @@ def identity(net: str, kind: str, branched: int) -> bool:
 def refused(net: str) -> bool:
     """Whether a branch of an episode with an ego in another process is refused; prints it."""
     with running(net, ego=f"exec:{sys.executable} {OUTSIDE}") as runner:
+        runner.try_out()  # which starts the program
         loop = begun(runner, 0)
         loop.step()
         try:
@@ -245,10 +247,10 @@ def failures(net: str, runs: int) -> bool:
         start = statistics.median(timed(lambda: begun(runner, 0)) for _ in range(3))
         for run in range(runs):
             for mode, patches in modes.items():
-                asked = {"_first_avoided": NOBODY} if mode == ONE else {}
+                asked = NOBODY if mode == ONE else AvoidabilityCheck._first_avoided
                 with (
                     mock.patch.multiple(avoidability, **patches),
-                    mock.patch.multiple(avoidability.AvoidabilityCheck, **asked),
+                    mock.patch.object(AvoidabilityCheck, "_first_avoided", asked),
                     mock.patch.object(checkpoints, "can_fork", lambda m=mode: m in (DEFAULT, ONE)),
                 ):
                     before = processor_time()
