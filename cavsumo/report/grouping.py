@@ -78,7 +78,11 @@ class Group(Told):
     @property
     def valid(self) -> pandas.DataFrame:
         """The rows of valid episodes."""
-        return self.rows[~self.rows["outcome"].isin(("error", "invalid"))]
+        return self.valid_cells(list(self.rows))
+
+    def valid_cells(self, columns: list[str]) -> pandas.DataFrame:
+        """Some columns of the rows of valid episodes."""
+        return self.rows.loc[~self.rows["outcome"].isin(("error", "invalid")), columns]
 
 
 def grouped(evidence: Evidence, by: str = "agent") -> list[Group]:

@@ -100,6 +100,7 @@ def test_branching(play: Play, capsys: pytest.CaptureFixture[str]) -> None:
     said = capsys.readouterr().out
     assert ended.value.code == 0, said
     assert said.count("5 of 5 branches the same (0 errors), 1 of 1 episodes") == 2
+    assert "refused  pedestrians" in said
     assert "by fork" in said
     before, after = said.split("resources")[1].splitlines()[0].split(": ")[1].split("; ")
     assert before.rpartition(",")[0] == after.rpartition(",")[0]

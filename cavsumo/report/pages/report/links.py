@@ -66,7 +66,8 @@ def chosen(report: Report, pages: int) -> tuple[list[LinkedRun], list[LinkedRun]
     alike = {(cell.file, cell.run): cell.count for cell in report.failures}
     firsts = {key: rank for rank, key in enumerate(alike)}
     keys = list(zip(failures["file"], failures["run"], strict=True))
-    kinds = [ORDER.index(failure_kind(row)) for row in failures[[*JUDGED]].to_dict("records")]
+    told = zip(*(failures[name] for name in JUDGED), strict=True)
+    kinds = [ORDER.index(failure_kind(dict(zip(JUDGED, cells, strict=True)))) for cells in told]
     order = sorted(range(len(keys)), key=lambda i: (kinds[i], firsts.get(keys[i], len(firsts)), i))
     picked = failures.iloc[order[: max(FAILURES, pages)]]
     spread = np.linspace(0, len(tests) - 1, min(len(tests), pages // 2 or TESTS))
