@@ -129,7 +129,7 @@ def _played(
     if output is None and (manner.resume or manner.retry_errors):
         raise InputError("run: resume and retry_errors go on with an output; none is given")
     folder = TemporaryFolder() if output is None else None
-    file = Path(output) if folder is None else folder.path / FILE
+    file = folder.path / FILE if folder is not None else Path(output or FILE)
     try:
         _play(parts, places, file, means, manner)
     except BaseException:

@@ -21,9 +21,8 @@ def read_config(file: Path) -> dict[str, Any]:
     """The settings of a scenario file (TOML) that describes one scenario."""
     data = read_toml(file)
     if VARY in data:
-        raise InputError(
-            f"config {str(file)!r}: [{VARY}] makes several batches of it; cavsumo.run_study plays them"
-        )
+        what = "makes several batches of it; cavsumo.run_study plays them"
+        raise InputError(f"config {str(file)!r}: [{VARY}] {what}")
     return settings_in(data, file)
 
 

@@ -155,7 +155,7 @@ def test_a_study_gives_the_results_of_each_batch(
     file = again.pop("testers1").file
     assert again["testers2"].replay(0).run == 0  # its folder is there as long as one of them is
     assert file.is_file()
-    with pytest.raises(cavsumo.InputError, match="cavsumo.run_study plays them"):
+    with pytest.raises(cavsumo.InputError, match="run_study plays them"):
         cavsumo.run(config=config)
     with pytest.raises(cavsumo.InputError, match="testers, which is given beside the file"):
         cavsumo.run_study(config, testers=3)
