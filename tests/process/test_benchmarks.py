@@ -240,8 +240,8 @@ def test_episode_server(play: Play, capsys: pytest.CaptureFixture[str]) -> None:
     said = capsys.readouterr().out.splitlines()
     assert not ended.value.code, said
     assert "3 of 3 the same" in said[0]
-    assert said[1].endswith("(1.00)")
-    assert "before and after 2 episodes" in said[-1]
+    assert "before and after 2 episodes" in said[1]
+    assert said[-1].endswith("(1.00)")
 
 
 def test_reading(play: Play) -> None:
