@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 import shapely
 from shapely.geometry import LineString, Point
 
-from cavsumo.model.cells import CellAnswer, Cells
+from cavsumo.model.cells import Cells
 from cavsumo.model.polyline import Path
 
 REACH_M = 60.0  # how far a crossing line is followed; wider carriageways are not crossed
@@ -205,9 +205,7 @@ class Roads:
         shapely.prepare(self.carriageway)
         shapely.prepare(self._boundary)
         shapely.prepare(self.pavements)
-        self.on_carriageway = Cells(
-            lambda x, y: CellAnswer(self.contains(x, y), self.edge_distance(x, y))
-        )
+        self.on_carriageway = Cells(self.contains, self.edge_distance)
         self._worlds: dict[tuple[float, bool], Cells] = {}
 
     def __reduce__(self) -> tuple[type[Roads], tuple[Any, ...]]:
@@ -221,12 +219,9 @@ class Roads:
         """Whether points are within a reach [m] of a carriageway, ``on_foot`` or of a pavement."""
         if (reach, on_foot) not in self._worlds:
             far = self.walking_distance if on_foot else self.driving_distance
-
-            def found(x: float, y: float) -> CellAnswer:
-                room = reach - far(x, y)
-                return CellAnswer(room >= 0.0, abs(room))
-
-            self._worlds[reach, on_foot] = Cells(found)
+            self._worlds[reach, on_foot] = Cells(
+                lambda x, y: far(x, y) <= reach, lambda x, y: abs(far(x, y) - reach)
+            )
         return self._worlds[reach, on_foot]
 
     def edge_distance(self, x: float, y: float) -> float:

@@ -13,7 +13,8 @@ import math
 from collections.abc import Callable
 from typing import NamedTuple
 
-SIDE_M = 0.5
+SIDE_M = 1.0
+NARROW_M = 0.5  # in a cell whose widest answer reaches no farther, rooms are not computed any more
 ROUNDING_M = 1e-6  # far above the rounding of any distance
 MOST = 200_000  # cells that are remembered
 
@@ -29,11 +30,14 @@ class Cells:
     """The answers of a computation.
 
     Args:
-        computed: the answer at a point (x, y) [m].
+        holds: the answer at a point (x, y) [m], for less than its room costs.
+        room: a distance from a point within which the answer cannot change [m].
     """
 
-    def __init__(self, computed: Callable[[float, float], CellAnswer]) -> None:
-        self._computed = computed
+    def __init__(
+        self, holds: Callable[[float, float], bool], room: Callable[[float, float], float]
+    ) -> None:
+        self._holds, self._room = holds, room
         self._known: dict[tuple[float, float], tuple[float, float, CellAnswer]] = {}
 
     def at(self, x: float, y: float) -> CellAnswer:
@@ -45,7 +49,9 @@ class Cells:
             left = room - math.hypot(x - there_x, y - there_y) - ROUNDING_M
             if left > 0.0:
                 return CellAnswer(holds, left)
-        answer = self._computed(x, y)
+            if room <= NARROW_M:
+                return CellAnswer(self._holds(x, y), 0.0)
+        answer = CellAnswer(self._holds(x, y), self._room(x, y))
         if known is None or answer.room > known[2].room:
             self._note(cell, (x, y, answer))
         return answer

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from cavsumo.model import cells
 from cavsumo.model.carriageway import Roads
-from cavsumo.model.cells import CellAnswer, Cells
+from cavsumo.model.cells import Cells
 
 PLACES = st.lists(st.tuples(st.floats(-9, 9), st.floats(-9, 9)), min_size=1, max_size=30)
 # A carriageway with a hole and a notch, and a pavement beside it.
@@ -48,16 +48,16 @@ def test_an_answer_is_remembered_as_far_as_it_reaches(monkeypatch: pytest.Monkey
     """The half-plane x > 0, one cell after the other; what is remembered is bounded."""
     asked: list[float] = []
 
-    def computed(x: float, y: float) -> CellAnswer:
+    def holds(x: float, y: float) -> bool:
         asked.append(x)
-        return CellAnswer(x > 0.0, abs(x))
+        return x > 0.0
 
-    half = Cells(computed)
+    half = Cells(holds, lambda x, y: abs(x))
     assert half.at(3.1, 0.1) == (True, 3.1)
     assert half.at(3.4, 0.1) == (True, pytest.approx(3.1 - 0.3, abs=1e-5))
-    assert half.at(3.6, 0.1) == (True, 3.6)
-    assert [half.at(x, 0.0).holds for x in (0.1, 0.15, 0.45, 0.1, -0.1)] == [True] * 4 + [False]
-    assert asked == [3.1, 3.6, 0.1, 0.45, -0.1]
+    assert half.at(4.1, 0.1) == (True, 4.1)
+    assert [half.at(x, 0.0) for x in (0.1, 0.45, -0.1)] == [(True, 0.1), (True, 0.0), (False, 0.1)]
+    assert asked == [3.1, 4.1, 0.1, 0.45, -0.1]
     monkeypatch.setattr(cells, "MOST", 2)
     for i in range(9):
         half.at(5.0 + i, 0.0)
