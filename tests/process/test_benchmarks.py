@@ -247,6 +247,8 @@ def test_episode_server(play: Play, capsys: pytest.CaptureFixture[str]) -> None:
 def test_reading(play: Play) -> None:
     """A small network, once."""
     assert "1 site" in play("reading", "--net", NET, "--times", "1")
+
+
 def test_scale(play: Play, capsys: pytest.CaptureFixture[str]) -> None:
     """Four episodes for eight rows, read by this checkout twice."""
     with pytest.raises(SystemExit) as ended:

@@ -38,7 +38,9 @@ def test_the_bytes_depend_on_the_text_alone() -> None:
     assert len(data) < len(TEXT) / 3
 
 
-@pytest.mark.parametrize("data", [packed(TEXT), gzip.compress(TEXT.encode(), mtime=0), TEXT.encode()])
+@pytest.mark.parametrize(
+    "data", [packed(TEXT), gzip.compress(TEXT.encode(), mtime=0), TEXT.encode()]
+)
 def test_compressed_and_plain_are_read_under_any_name(file: Path, data: bytes) -> None:
     """What a file holds is known by its first bytes, since people rename and unpack."""
     file.write_bytes(data)
