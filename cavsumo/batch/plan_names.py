@@ -5,7 +5,7 @@ from __future__ import annotations
 from cavsumo.agents.names import AGENT_NAMES, policy_file
 from cavsumo.assertions.formulas.rules import rule
 from cavsumo.assertions.names import ASSERTION_NAMES, is_formula
-from cavsumo.egos.names import EGO_NAMES
+from cavsumo.egos.names import EGO_NAMES, is_built_in
 from cavsumo.egos.reference.names import REFERENCE_NAMES
 from cavsumo.errors import InputError, UnknownName
 from cavsumo.model.bodies import kind_named
@@ -16,13 +16,13 @@ from cavsumo.model.scenario import NO_REFERENCE, BatchPlan
 def check_names(plan: BatchPlan) -> None:
     """Raise UnknownName, with the nearest name, for an unknown name, signals of formulas included.
 
-    Names with a colon (``module:Class``) are resolved later, when they are built; so are formulas
-    in place of a name.
+    Names such as ``module:Class`` and ``exec:COMMAND`` are resolved later, when they are built; so
+    are formulas in place of a name.
     """
     scenario = plan.scenario
     for name in plan.cast.values():
         _check_agent(name)
-    if ":" not in scenario.ego:
+    if is_built_in(scenario.ego):
         EGO_NAMES.check(scenario.ego)
     kind_named(scenario.kind)
     if plan.reference != NO_REFERENCE and plan.reference not in REFERENCE_NAMES:
