@@ -212,6 +212,11 @@ class Roads:
         """Whether a point lies on the carriageway."""
         return bool(shapely.contains_xy(self.carriageway, x, y))
 
+    def contain(self, xs: Sequence[float], ys: Sequence[float]) -> list[bool]:
+        """Which of several points lie on the carriageway."""
+        found: list[bool] = shapely.contains_xy(self.carriageway, xs, ys).tolist()
+        return found
+
     def edge_distance(self, x: float, y: float) -> float:
         """Distance to the nearest edge of a carriageway [m]."""
         return float(shapely.distance(self._boundary, Point(x, y)))
