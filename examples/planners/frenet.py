@@ -3,8 +3,8 @@
     pip install frenetix==0.4.0        (Python below 3.13)
     cavsumo run --net networks/crossing.net.xml --ego "exec:python examples/planners/frenet.py"
 
-In every timestep it samples trajectories in the lane; the cheapest feasible one is followed. The
-package has no check of collisions: their probability is one of the costs.
+In every timestep the cheapest feasible trajectory in the lane is followed. The package has no check
+of collisions: their probability is one of the costs.
 """
 
 import math
@@ -14,8 +14,8 @@ from common import brake, follow, package, serve
 
 ENDS_S, SPEEDS, OFFSETS = (1.1, 2.0, 3.0, 4.0), 9, 3  # samples of a trajectory's end
 SPREAD_M = 0.3  # standard deviation of a predicted place
-LOW = 2.0  # below this speed lateral motion is planned over the way, not over time [m/s]
-WEIGHTS = {"jerk": 0.2, "offset": 5.0, "speed": 1.0, "collision": 10000.0}
+LOW = 2.0  # below this speed lateral motion is planned over the way [m/s]
+WEIGHTS = {"jerk": 0.2, "offset": 5.0, "speed": 1.0, "risk": 10000.0}
 HARD = -8.0  # braking when no trajectory is feasible [m/s2]
 PIP = "frenetix==0.4.0"
 
@@ -26,9 +26,8 @@ def begin(fx, np, road):
     base, room = road.ego.wheelbase_m, (road.width - road.ego.width_m) / 2
 
     def plan(seen):
-        state = fx.CartesianPlannerState(
-            np.array(seen.rear), seen.heading, seen.speed, seen.acceleration, seen.steering
-        )
+        motion = seen.speed, seen.acceleration, seen.steering
+        state = fx.CartesianPlannerState(np.array(seen.rear), seen.heading, *motion)
         low, fastest = seen.speed < LOW, max(seen.speed_limit, seen.speed)
         now = fx.compute_initial_state(course, state, base, low)
         ends = [
@@ -52,19 +51,18 @@ def begin(fx, np, road):
 def functions(fx, np, seen, course, low):
     """The trajectory handler with the limits of the ego and the costs of this moment."""
     ego, parts = seen.road.ego, fx.trajectory_functions
-    limits, costs = parts.feasability_functions, parts.cost_functions
+    limits, costs, w = parts.feasability_functions, parts.cost_functions, WEIGHTS
     bodies = {b.number: predicted(fx, np, b, seen.road.dt) for b in seen.obstacles}
-    size, w = (ego.length_m, ego.width_m, ego.wheelbase_m / 2), WEIGHTS
+    size = ego.length_m, ego.width_m, ego.wheelbase_m / 2
     made, most = fx.TrajectoryHandler(seen.road.dt), (ego.steering_max_rad, ego.wheelbase_m)
     made.add_feasability_function(limits.CheckAccelerationConstraint(50.0, 9.0, True))
     made.add_feasability_function(limits.CheckCurvatureConstraint(*most, True))
     made.add_function(parts.FillCoordinates(low, seen.heading, course, ENDS_S[-1]))
     made.add_cost_function(costs.CalculateLongitudinalJerkCost("jerk", w["jerk"]))
     made.add_cost_function(costs.CalculateDistanceToReferencePathCost("offset", w["offset"]))
-    wanted = w["speed"], seen.speed_limit, seen.road.dt, ENDS_S[0], False, 2
-    made.add_cost_function(costs.CalculateVelocityOffsetCost("speed", *wanted))
-    risk = w["collision"], bodies, *size
-    made.add_cost_function(costs.CalculateCollisionProbabilityFast("collision", *risk))
+    wanted, risk = (seen.speed_limit, seen.road.dt, ENDS_S[0], False, 2), (bodies, *size)
+    made.add_cost_function(costs.CalculateVelocityOffsetCost("speed", w["speed"], *wanted))
+    made.add_cost_function(costs.CalculateCollisionProbabilityFast("risk", w["risk"], *risk))
     return made
 
 

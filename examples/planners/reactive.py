@@ -19,10 +19,10 @@ PIP = "commonroad-reactive-planner==2025.1"
 
 def begin(rp, np, road):
     """A planner for one episode; `rp` is the package's module of the planner, `np` numpy."""
-    line, half = np.array(road.points), np.array([0.0, road.width / 2])
-    planner = rp.ReactivePlanner(configuration(rp, road, line, half))
+    planner = rp.ReactivePlanner(configuration(rp, road))
     courses = package("commonroad_rp.utility.utils_coordinate_system", PIP)
-    planner.set_reference_path(coordinate_system=courses.create_coordinate_system(line))
+    course = courses.create_coordinate_system(np.array(road.points))
+    planner.set_reference_path(coordinate_system=course)
     made = []  # the states of the plan that is followed, from the present one on
 
     def plan(seen):
@@ -34,7 +34,7 @@ def begin(rp, np, road):
             planner.reset(
                 initial_state_cart=rp.ReactivePlannerState(**state),
                 collision_checker=checker(rp.pycrcc, seen),
-                coordinate_system=planner.coordinate_system,
+                coordinate_system=course,
             )
             planner.set_desired_velocity(seen.speed_limit, max(seen.speed, 0.01))
             found = planner.plan()
@@ -48,19 +48,17 @@ def begin(rp, np, road):
     return plan
 
 
-def configuration(rp, road, line, half):
-    """The planner's settings: its defaults, the ego's size, and a network of the route's lane."""
+def configuration(rp, road):
+    """The planner's settings: its defaults, the ego's body, the room in the lane, no map."""
     config, ego = rp.ReactivePlannerConfiguration(), road.ego
     config.planning.dt, config.planning.time_steps_computation = road.dt, STEPS
     config.debug.multiproc, config.debug.logging_level = False, "ERROR"
-    config.vehicle.length, config.vehicle.width = ego.length_m, ego.width_m
-    config.vehicle.wb_front_axle = config.vehicle.wb_rear_axle = ego.wheelbase_m / 2
-    config.vehicle.__post_init__()  # computes the wheelbase
+    arm, most = ego.wheelbase_m / 2, ego.steering_max_rad
+    size, axles = (ego.length_m, ego.width_m), {"wb_front_axle": arm, "wb_rear_axle": arm}
+    config.vehicle = rp.VehicleConfiguration(2, *size, **axles, delta_min=-most, delta_max=most)
     config.sampling.d_max = (road.width - ego.width_m) / 2
     config.sampling.d_min = -config.sampling.d_max
-    scenario, lanes = rp.Scenario(road.dt), package("commonroad.scenario.lanelet", PIP)
-    scenario.add_objects(lanes.Lanelet(line + half, line, line - half, 1))
-    config.update(scenario=scenario)
+    config.update(scenario=rp.Scenario(road.dt))
     return config
 
 
