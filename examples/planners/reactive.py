@@ -37,7 +37,10 @@ def begin(rp, np, road):
                 coordinate_system=course,
             )
             planner.set_desired_velocity(seen.speed_limit, max(seen.speed, 0.01))
-            found = planner.plan()
+            try:
+                found = planner.plan()
+            except TypeError:  # 2025.1 prints a cost that it has not, when it stands and finds none
+                found = None
             made[:] = [(*s.position, s.velocity) for s in found[0].state_list] if found else []
         if len(made) < 2:
             return brake(seen, HARD)
@@ -53,9 +56,8 @@ def configuration(rp, road):
     config, ego = rp.ReactivePlannerConfiguration(), road.ego
     config.planning.dt, config.planning.time_steps_computation = road.dt, STEPS
     config.debug.multiproc, config.debug.logging_level = False, "ERROR"
-    arm, most = ego.wheelbase_m / 2, ego.steering_max_rad
-    size, axles = (ego.length_m, ego.width_m), {"wb_front_axle": arm, "wb_rear_axle": arm}
-    config.vehicle = rp.VehicleConfiguration(2, *size, **axles, delta_min=-most, delta_max=most)
+    size, axles = (ego.length_m, ego.width_m), (ego.wheelbase_m / 2, ego.wheelbase_m / 2)
+    config.vehicle = rp.VehicleConfiguration(2, *size, *axles)
     config.sampling.d_max = (road.width - ego.width_m) / 2
     config.sampling.d_min = -config.sampling.d_max
     config.update(scenario=rp.Scenario(road.dt))
