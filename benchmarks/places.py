@@ -56,7 +56,7 @@ def _line(net: Path, ego: str, agent: str, options: argparse.Namespace) -> str:
     """One row of the table."""
     settings = EGOS[ego] | {"traffic": options.traffic, "agents": [agent], "progress": False}
     if agent == LEARNER:
-        settings["params"] = _learned(net, settings, options)
+        settings["params"] = learned(net, settings, options)
     results = cavsumo.run(
         net, **settings, runs=options.runs, seed=options.seed, jobs=options.jobs, trace="none"
     )
@@ -73,7 +73,7 @@ def _line(net: Path, ego: str, agent: str, options: argparse.Namespace) -> str:
     )
 
 
-def _learned(net: Path, settings: dict[str, Any], options: argparse.Namespace) -> dict[str, Any]:
+def learned(net: Path, settings: dict[str, Any], options: argparse.Namespace) -> dict[str, Any]:
     """Parameters of a learner that plays what it learned against the same ego."""
     lessons = cavsumo.run(
         net, **settings, runs=options.learn, seed=options.seed + LEARNING_SEEDS, trace="none"

@@ -18,8 +18,8 @@ def check_names(plan: BatchPlan) -> None:
     """Raise UnknownName, with the nearest name, for an unknown name, those of parameters and of
     signals in formulas included.
 
-    Names with a colon (``module:Class``) are resolved later, when they are built; so are formulas
-    in place of a name.
+    Names such as ``module:Class`` and ``exec:COMMAND`` are resolved later, when they are built; so
+    are formulas in place of a name.
     """
     scenario = plan.scenario
     for name in plan.cast.values():

@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Collection
 from pathlib import Path
 
+from cavsumo.egos.names import is_built_in
 from cavsumo.errors import InputError
 from cavsumo.model.objects import is_object
 from cavsumo.model.scenario import Scenario
@@ -42,7 +43,7 @@ def check_trust(
 
 def _is_foreign(name: str) -> bool:
     """Whether using a name runs, imports or connects; an object is this session's or unknown."""
-    return ":" in name and not is_object(name)
+    return ":" in name and not is_object(name) and not is_built_in(name)
 
 
 def _use(spec: str) -> str:

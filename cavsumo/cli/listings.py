@@ -8,7 +8,7 @@ from typing import Any
 
 from cavsumo.agents.names import AGENT_NAMES, policy_file
 from cavsumo.assertions.names import ASSERTION_NAMES
-from cavsumo.egos.names import EGO_NAMES, EXTERNAL_NAMES
+from cavsumo.egos.names import EGO_NAMES, EXTERNAL_NAMES, is_built_in
 from cavsumo.model.names import Names
 from cavsumo.model.registry import Registry
 
@@ -30,7 +30,7 @@ def registries() -> dict[str, Registry[Any]]:
 
 def listing(sort: str, name: str | None) -> str:
     """One line for each entry, or one entry with its parameters, defaults and units."""
-    if name is not None and ":" not in name and not (sort == "egos" and name in EXTERNAL_NAMES):
+    if name is not None and _is_declared(sort, name):
         NAMES[sort].check(name)
     registry = registries()[sort]
     if sort == "agents" and name is not None and name.startswith("policy:"):
@@ -40,7 +40,7 @@ def listing(sort: str, name: str | None) -> str:
         return "\n".join(_columns({**lines, **_forms(sort)}))
     if sort == "egos":
         registry = _registry_of(name, registry)
-        name = name.partition(":")[0]
+        name = name if name in registry else name.partition(":")[0]
     elif sort == "assertions":
         registry = _with_own(name)
     shown = {
@@ -51,6 +51,13 @@ def listing(sort: str, name: str | None) -> str:
     return "\n".join(
         [f"{name}: {registry.summary(name)}", *(f"  {line}" for line in _columns(shown))]
     )
+
+
+def _is_declared(sort: str, name: str) -> bool:
+    """Whether a name must be in the table of its sort, without anything of the user's."""
+    if sort == "egos":
+        return name not in EXTERNAL_NAMES and is_built_in(name)
+    return ":" not in name
 
 
 def _columns(lines: Mapping[str, str]) -> list[str]:

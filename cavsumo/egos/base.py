@@ -9,11 +9,12 @@ from typing import ClassVar, NamedTuple
 
 from cavsumo.egos.names import EGO_NAMES
 from cavsumo.model.bodies import CAR, Kind
-from cavsumo.model.carriageway import Light
+from cavsumo.model.carriageway import Light, MarkedCrossing
 from cavsumo.model.polyline import Path as Polyline
 from cavsumo.model.registry import Registry
 from cavsumo.model.scene import Scene
 from cavsumo.model.snapshot import Snapshot
+from cavsumo.model.surroundings import Surroundings
 
 # CAV-Gym's car on roads that allow more than its 9 m/s.
 EGO_KIND = dataclasses.replace(CAR, v_max=55.0)
@@ -46,6 +47,8 @@ class Mission:
         lights: the traffic lights on it.
         dt: length of a timestep [s].
         horizon: longest duration of an episode [s].
+        crossings: the marked crossings on the route, in order.
+        surroundings: the lanes and pavements near it.
     """
 
     net: Path
@@ -54,6 +57,8 @@ class Mission:
     lights: tuple[Light, ...]
     dt: float
     horizon: float
+    crossings: tuple[MarkedCrossing, ...] = ()
+    surroundings: Surroundings = dataclasses.field(default_factory=Surroundings)
 
 
 class Ego:

@@ -13,11 +13,21 @@ EGO_NAMES = Names(
     {
         "constant": "constant",
         "sumo": "sumo",
+        "sumo:ACC": "sumo_models",
+        "sumo:CACC": "sumo_models",
+        "sumo:EIDM": "sumo_models",
+        "sumo:IDM": "sumo_models",
+        "sumo:Krauss": "sumo_models",
         "time-gap": "time_gap",
     },
     {
         "constant": "speed",
-        "sumo": "carFollowModel actionStepLength",  # and attributes of a vType
+        "sumo": "carFollowModel reaction_s",  # and attributes of a vType, as those below
+        "sumo:ACC": "reaction_s",
+        "sumo:CACC": "reaction_s",
+        "sumo:EIDM": "reaction_s",
+        "sumo:IDM": "reaction_s",
+        "sumo:Krauss": "reaction_s",
         "time-gap": "speed time_gap_s standstill_m accel decel margin_m",
     },
 )
@@ -28,15 +38,20 @@ EXTERNAL_NAMES = Names("ego", "cavsumo.egos.external", {"exec": "ego", "tcp": "e
 def check_ego(name: str, params: Iterable[str]) -> None:
     """Refuse an unknown ego, or parameters that it does not have.
 
-    One of the user's own, with a colon in its name, is checked when it is built.
+    One of the user's own is checked when it is built.
     """
-    if ":" in name:
+    if not is_built_in(name):
         return
     EGO_NAMES.check(name)
     known = EGO_NAMES.parameters(name)
     if known is None:
         return
-    if name == "sumo":
-        check_attributes(key for key in params if key not in known)
+    if name.partition(":")[0] == "sumo":
+        check_attributes((key for key in params if key not in known), f"ego {name}")
     else:
         check_parameters(params, known, f"ego {name}")
+
+
+def is_built_in(ego: str) -> bool:
+    """Whether a name can only be one of ours: without a colon, or a variant such as sumo:IDM."""
+    return ego.partition(":")[0] in EGO_NAMES or ":" not in ego

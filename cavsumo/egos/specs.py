@@ -10,6 +10,7 @@ from typing import Any
 from cavsumo.egos.base import EGOS, Ego
 from cavsumo.egos.controller import ControllerEgo, controller_class
 from cavsumo.egos.external.ego import EXTERNAL, command_words
+from cavsumo.egos.names import is_built_in
 from cavsumo.model.objects import Copies, is_object
 from cavsumo.model.plugins import source_file
 from cavsumo.model.registry import Registry
@@ -25,9 +26,9 @@ FORMS: Mapping[str, str] = {
 
 def make_ego(spec: str, params: Mapping[str, Any]) -> Ego:
     """The registered ego of that name, an external one, or the controller ``module:Class``."""
-    sort, colon, _ = spec.partition(":")
-    if not colon:
+    if is_built_in(spec):
         return EGOS.make(spec, params)
+    sort = spec.partition(":")[0]
     if sort in EXTERNAL:
         return _alone(spec, partial(EXTERNAL.get(sort), spec)).make(spec, params)
     factory = controller_class(spec)
@@ -51,8 +52,8 @@ def _leaves_driving_to_sumo(factory: Callable[..., Any]) -> bool:
 
 def ego_files(spec: str) -> tuple[Path, ...]:
     """The files that define an ego: those that a command names, or the class's module."""
-    sort, colon, address = spec.partition(":")
-    if not colon or sort == "tcp":
+    sort, _, address = spec.partition(":")
+    if is_built_in(spec) or sort == "tcp":
         return ()
     if sort == "exec":
         words = dict.fromkeys(command_words(address))

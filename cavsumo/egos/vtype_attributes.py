@@ -33,8 +33,8 @@ VTYPE_ATTRIBUTES = frozenset(
 )
 
 
-def check_attributes(names: Iterable[str]) -> None:
+def check_attributes(names: Iterable[str], ego: str) -> None:
     """Raise UnknownName for a name that no attribute has."""
     for name in names:
         if name not in VTYPE_ATTRIBUTES:
-            raise UnknownName("attribute of a SUMO vType", name, VTYPE_ATTRIBUTES, "ego sumo")
+            raise UnknownName("attribute of a SUMO vType", name, VTYPE_ATTRIBUTES, ego)

@@ -224,6 +224,11 @@ class Roads:
             )
         return self._worlds[reach, on_foot]
 
+    def contain(self, xs: Sequence[float], ys: Sequence[float]) -> list[bool]:
+        """Which of several points lie on the carriageway."""
+        found: list[bool] = shapely.contains_xy(self.carriageway, xs, ys).tolist()
+        return found
+
     def edge_distance(self, x: float, y: float) -> float:
         """Distance to the nearest edge of a carriageway [m]."""
         return float(shapely.distance(self._boundary, Point(x, y)))

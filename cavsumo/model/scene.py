@@ -12,6 +12,7 @@ from cavsumo.model.bodies import Body
 from cavsumo.model.carriageway import Crossing, Light, Limit, MarkedCrossing, Roads, Start
 from cavsumo.model.polyline import Path, Projection
 from cavsumo.model.snapshot import Snapshot
+from cavsumo.model.surroundings import Surroundings
 
 
 @dataclass(frozen=True)
@@ -29,6 +30,7 @@ class Scene:
         crossings: the marked pedestrian crossings on the ego's path, likewise.
         limits: the speed limits on the ego's path, likewise.
         ground: the areas for walking or driving near the ego's path; None if unknown.
+        surroundings: the lanes and pavements near the ego's path.
         horizon: longest duration of the episode [s]; infinite if not limited.
         seed: of the episode, for code that draws random numbers without a given generator.
     """
@@ -45,6 +47,7 @@ class Scene:
     limits: tuple[Limit, ...] = ()
     horizon: float = math.inf
     ground: shapely.Geometry | None = field(default=None, repr=False)
+    surroundings: Surroundings = field(default_factory=Surroundings, repr=False)
     _progress: list[Any] = field(default_factory=lambda: [None, None], repr=False)
     _glimpse: list[Any] = field(default_factory=lambda: [None, None], repr=False)
     _ways: dict[int, Crossing | None] = field(default_factory=dict, repr=False)

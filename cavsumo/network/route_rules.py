@@ -8,22 +8,17 @@ import shapely
 from shapely.geometry import LineString, Point
 
 from cavsumo.model.carriageway import Limit, MarkedCrossing
-from cavsumo.network.ego_routes import EgoRoute, lanes_along
+from cavsumo.network.ego_routes import EgoRoute
 from cavsumo.network.reader import Network, lane_areas
+from cavsumo.network.surroundings import route_lanes
 
 PRIORITY = "M"  # SUMO's state of a link with priority
 
 
 def limits_along(network: Network, route: EgoRoute) -> tuple[Limit, ...]:
     """The speed limits on the ego's path, in order; a lane with the limit of the last adds none."""
-    lanes = lanes_along(network, [network.edge(edge) for edge in route.edges])
-    assert lanes is not None  # or it were no route
     found: list[Limit] = []
-    for lane in lanes:
-        along = route.path.project(*lane.getShape()[0]).along if found else 0.0
-        speed = float(lane.getSpeed())
-        while found and found[-1].along >= along:  # lanes before the path's beginning
-            found.pop()
+    for along, _, speed in route_lanes(network, route):
         if not found or found[-1].speed != speed:
             found.append(Limit(along, speed))
     return tuple(found)

@@ -23,6 +23,7 @@ from cavsumo.model.carriageway import Approach, Light, Limit, MarkedCrossing, Ro
 from cavsumo.model.geometry import Box
 from cavsumo.model.scene import Scene
 from cavsumo.model.stopping_way import is_clear
+from cavsumo.model.surroundings import Surroundings
 from cavsumo.model.vocabulary import Signal
 from cavsumo.network.approaches import approaches
 from cavsumo.network.ego_routes import (
@@ -42,6 +43,7 @@ from cavsumo.network.pedestrian_starts import (
 )
 from cavsumo.network.reader import Network, read_network
 from cavsumo.network.route_rules import crossings_along, limits_along
+from cavsumo.network.surroundings import surroundings
 from cavsumo.network.traffic import Volume, background
 from cavsumo.network.traffic_lights import LightStart, Pace, light_start, lights_along
 from cavsumo.network.vehicle_starts import draw_vehicles
@@ -68,6 +70,7 @@ class Site:
         marked: the marked pedestrian crossings on the ego's route.
         limits: the speed limits on the ego's route.
         ground: the areas for walking or driving near the route, if pedestrians must stay on it.
+        surroundings: the lanes and pavements near the route.
     """
 
     net: Path
@@ -82,6 +85,7 @@ class Site:
     marked: tuple[MarkedCrossing, ...] = ()
     limits: tuple[Limit, ...] = ()
     ground: shapely.Geometry | None = None
+    surroundings: Surroundings = field(default_factory=Surroundings)
 
     def draw(
         self, kinds: Sequence[Kind], ego: Kind, start_speed: float | None, rng: np.random.Generator
@@ -126,6 +130,7 @@ class Site:
             crossings=self.marked,
             limits=self.limits,
             ground=self.ground,
+            surroundings=self.surroundings,
         )
 
 
@@ -219,6 +224,7 @@ def _derived(
         crossings_along(network, route),
         limits_along(network, route),
         network.ground(LineString(route.path.points), GROUND_M) if walks_on_pavements else None,
+        surroundings(network, route),
     )
 
 

@@ -37,8 +37,17 @@ class Setup:
     @property
     def mission(self) -> Mission:
         """The data that the ego has before its first episode."""
-        site, route, horizon = self.site, self.site.route, self.scenario.end
-        return Mission(site.net, route.edges, route.path, site.lights, self.world.dt, horizon)
+        site, route, dt = self.site, self.site.route, self.world.dt
+        return Mission(
+            site.net,
+            route.edges,
+            route.path,
+            site.lights,
+            dt,
+            self.scenario.end,
+            crossings=site.marked,
+            surroundings=site.surroundings,
+        )
 
     def close(self) -> None:
         """End the ego and the simulation."""

@@ -37,7 +37,16 @@ class ScriptNetwork:
     def mission(self, steps: int) -> Mission:
         """The data that an ego has before its first episode."""
         site, route = self.site, self.site.route
-        return Mission(site.net, route.edges, route.path, site.lights, self.dt, steps * self.dt)
+        return Mission(
+            site.net,
+            route.edges,
+            route.path,
+            site.lights,
+            self.dt,
+            steps * self.dt,
+            crossings=site.marked,
+            surroundings=site.surroundings,
+        )
 
     def scene(self, ego: Kind, seed: int, testers: int = TESTERS) -> Scene:
         """A scene with tester pedestrians on the pavements beside the ego's way."""

@@ -197,6 +197,19 @@ def test_places(play: Play) -> None:
     assert {len(line) for line in lines} == {11}
 
 
+def test_drivers(play: Play) -> None:
+    """Two egos that are built in, and a program in the place of a planner."""
+    words = "--runs 1 --traffic 0 --agent timing --ego time-gap --ego sumo:IDM/0 --planner"
+    program = {"careful": "../egos/stop_for_pedestrians.py"}
+    said = play("drivers", NET, *words.split(), f"careful={sys.executable}", SCRIPTS=program)
+    lines = [line.split() for line in said.splitlines()[1:]]
+    assert [(line[0], line[-1]) for line in lines] == [
+        ("time-gap", "0"),
+        ("sumo:IDM/0", "0"),
+        ("careful", "0"),
+    ]
+
+
 def test_pages(play: Play) -> None:
     """Two seconds of an episode, on one screen."""
     if CHROMIUM is None:

@@ -5,13 +5,15 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator
 from itertools import pairwise
+from pathlib import Path
 from typing import Any
+from xml.etree import ElementTree
 
 import libsumo
 import pytest
 
 from cavsumo.agents.base import Scene
-from cavsumo.egos import make_ego
+from cavsumo.egos import EGOS, make_ego
 from cavsumo.errors import InputError, UnknownName
 from cavsumo.model.bodies import CAR, PEDESTRIAN, Body
 from cavsumo.model.carriageway import Start
@@ -19,6 +21,7 @@ from cavsumo.model.snapshot import BodyState, Snapshot
 from cavsumo.sumo.world import World
 
 Opener = Callable[..., World]
+NAMED = [name for name in EGOS if name.startswith("sumo:")]
 LANE_Y = -1.825  # of the ego's lane on the straight road [m]
 
 
@@ -104,7 +107,8 @@ def test_the_car_following_model_is_the_one_asked_for(open_world: Opener) -> Non
 
 def test_by_default_the_driver_has_a_reaction_time(open_world: Opener) -> None:
     """SUMO's driver decides once a second by default, in every timestep when told so."""
-    for seconds, params in (1.0, {}), (0.1, {"actionStepLength": 0}):
+    asked = {"reaction_s": 0}, {"reaction_s": 0.5}, {"actionStepLength": 0}
+    for seconds, params in zip((1.0, 0.1, 0.5, 0.1), ({}, *asked), strict=True):
         with open_world(ego_params=params) as world:
             next(episode(world))
             assert libsumo.vehicle.getActionStepLength("ego") == seconds
@@ -115,6 +119,10 @@ def test_by_default_the_driver_has_a_reaction_time(open_world: Opener) -> None:
     [
         ({"decell": 3.0}, UnknownName, "did you mean 'decel'"),
         ({"carFollowModell": "IDM"}, UnknownName, "did you mean 'carFollowModel'"),
+        ({"carFollowModel": "IMD"}, UnknownName, "car-following model 'IMD'; did you mean 'IDM'"),
+        ({"carFollowModel": 7}, UnknownName, "unknown car-following model '7'"),
+        ({"reaction_s": 11}, InputError, r"reaction_s must lie in \[0, 10\]"),
+        ({"reaction_s": 1, "actionStepLength": 1}, InputError, "expected one of them"),
         ({"decel": math.nan}, InputError, "decel must be finite"),
         ({"actionStepLength": -1.0}, InputError, r"actionStepLength must lie in \[0, 10\]"),
         ({"length": math.inf}, InputError, "length must be finite, got inf"),
@@ -128,6 +136,68 @@ def test_an_attribute_that_sumo_would_swallow_is_refused(
     """SUMO ignores unknown attributes without a word; here the nearest one is suggested."""
     with pytest.raises(error, match=words):
         make_ego("sumo", params)
+
+
+# SUMO's drivers by the name of their model
+
+
+@pytest.mark.parametrize("ego", NAMED)
+def test_the_model_in_the_name_is_in_force(open_world: Opener, tmp_path: Path, ego: str) -> None:
+    """SUMO's own state names the model of the ego's type; the driver decides once a second."""
+    with open_world(ego=ego) as world:
+        next(episode(world))
+        libsumo.simulation.saveState(str(tmp_path / "state.xml"))
+        types = ElementTree.parse(tmp_path / "state.xml").iter("vType")
+        found = {t.get("id"): t.get("carFollowModel") for t in types}
+        assert found["cavsumo_ego"] == ego.removeprefix("sumo:")
+        assert libsumo.vehicle.getActionStepLength("ego") == 1.0
+
+
+def test_the_models_drive_differently_and_as_the_attribute_makes_them(open_world: Opener) -> None:
+    """Before a standing pedestrian no two models brake alike; carFollowModel is the same driver."""
+    driven = {}
+    for ego in NAMED:
+        model = ego.removeprefix("sumo:")
+        for name, params in (ego, {}), ("sumo", {"carFollowModel": model}):
+            with open_world(ego=name, ego_params=params) as world:
+                driven[name, model] = [s.ego for s in episode(world, standing(90.0, LANE_Y))]
+        assert driven[ego, model] == driven["sumo", model]
+    speeds = {tuple(state.v for state in states) for states in driven.values()}
+    assert len(speeds) == len(NAMED)
+
+
+@pytest.mark.parametrize("reaction_s", [0.0, 1.0])
+@pytest.mark.parametrize("ego", NAMED)
+def test_each_model_stops_for_a_tester_on_a_crossing_and_arrives_when_it_is_free(
+    open_world: Opener, ego: str, reaction_s: float
+) -> None:
+    """A pedestrian that stands on the crossing in the ego's lane is not touched."""
+    with open_world("crossing", ego=ego, ego_params={"reaction_s": reaction_s}) as world:
+        path = world.site.route.path
+        crossing = world.site.crossings.centroid
+        x, y, o = path.at(path.project(crossing.x, crossing.y).along)
+        stopped = list(episode(world, standing(x, y, o + math.pi / 2)))[-1].ego
+        assert stopped.v < 0.3
+        room = math.hypot(x - stopped.x, y - stopped.y) - (CAR.length + PEDESTRIAN.width) / 2
+        assert 0.3 < room < 15.0
+        last = list(episode(world, standing(x + 15.0, y + 15.0)))[-1]
+        assert last.time < 40.0
+        assert path.project(last.ego.x, last.ego.y).along > path.length - 5.0
+
+
+@pytest.mark.parametrize(
+    ("ego", "params", "words"),
+    [
+        ("sumo:IMD", {}, "unknown ego 'sumo:IMD'; did you mean 'sumo:IDM'"),
+        ("sumo:", {}, "unknown ego 'sumo:'; did you mean 'sumo'"),
+        ("sumo:IDM", {"carFollowModel": "ACC"}, "ego sumo:IDM: carFollowModel is in the name"),
+        ("sumo:ACC", {"decell": 1}, "ego sumo:ACC: .*did you mean 'decel'"),
+    ],
+)
+def test_a_wrong_name_of_a_model_is_refused(ego: str, params: dict[str, Any], words: str) -> None:
+    """The nearest name is suggested, and a model that contradicts the name is none."""
+    with pytest.raises(InputError, match=words):
+        make_ego(ego, params)
 
 
 # The time-gap follower

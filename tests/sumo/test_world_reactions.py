@@ -232,7 +232,7 @@ def test_a_number_that_is_none_is_quoted(open_world: Opener, tmp_path: Path) -> 
 
 
 @pytest.mark.parametrize(
-    ("attribute", "value"), [("carFollowModel", "Krass"), ("accel", "fast"), ("decel", -1.0)]
+    ("attribute", "value"), [("laneChangeModel", "LC99"), ("accel", "fast"), ("decel", -1.0)]
 )
 def test_what_sumo_dislikes_about_the_ego_is_said(
     open_world: Opener, attribute: str, value: object

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import json
 import math
 import re
@@ -11,6 +12,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+import shapely
 from support import ROOT
 
 from cavsumo.agents.base import Scene
@@ -19,13 +21,19 @@ from cavsumo.egos.effectors import checked
 from cavsumo.egos.external import protocol
 from cavsumo.errors import EgoError
 from cavsumo.model.bodies import CAR, Body
-from cavsumo.model.carriageway import Light
+from cavsumo.model.carriageway import Light, MarkedCrossing
 from cavsumo.model.polyline import Path as Polyline
 from cavsumo.model.snapshot import Snapshot
+from cavsumo.model.surroundings import LaneBorders, RouteLane, Surroundings
 
 DOCS = ROOT / "docs" / "ego-protocol.md"
 LIGHTS = (Light("J1", 2, 40.0), Light("J2", 0, 80.0))
 PATH = Polyline([(0.0, -1.825), (99.0, -1.825)])
+ROAD = Surroundings(
+    (RouteLane(0.0, 3.65, 13.89),),
+    (LaneBorders("east_0", ((0.0, 0.0), (99.0, 0.0)), ((0.0, -3.65), (99.0, -3.65))),),
+    (((0.0, -3.65), (99.0, -3.65), (99.0, -6.65), (0.0, -6.65)),),
+)
 
 
 @pytest.fixture
@@ -53,8 +61,63 @@ def test_a_hello_has_the_constants_of_the_scenario() -> None:
     assert said["ego"]["steering_max_rad"] == EGO_KIND.steering_max
     assert said["ego"]["acceleration_min_mps2"] == -9.0
     assert said["network"] == str(Path.cwd() / "networks/x.net.xml")
-    assert said["route"] == {"edges": ["a", "b"], "points_m": [[0.0, -1.825], [99.0, -1.825]]}
+    route = {"edges": ["a", "b"], "points_m": [[0.0, -1.825], [99.0, -1.825]], "lanes": []}
+    assert said["route"] == route
     assert said["traffic_lights"][1] == {"id": "J2", "stop_line_m": 80.0}
+
+
+def test_a_hello_has_the_road_near_the_route() -> None:
+    """Lanes with their borders, pavements, and crossings with the right of way."""
+    zebra = shapely.box(40.0, -3.65, 44.0, 3.65)
+    crossings = (
+        MarkedCrossing("c1", 40.0, 44.0, zebra, None, True),
+        MarkedCrossing("c2", 60.0, 64.0, zebra, ("J1", 3), False),
+    )
+    mission = Mission(
+        Path("x.net.xml"), ("a",), PATH, (), 0.1, 60.0, crossings=crossings, surroundings=ROAD
+    )
+    said = json.loads(protocol.hello(mission, EGO_KIND))
+    assert said["route"]["lanes"] == [
+        {"from_m": 0.0, "width_m": 3.65, "speed_limit_mps": 13.89},
+    ]
+    left, right = [[0.0, 0.0], [99.0, 0.0]], [[0.0, -3.65], [99.0, -3.65]]
+    assert said["lanes"] == [{"id": "east_0", "left_m": left, "right_m": right}]
+    assert said["pavements_m"] == [[[0.0, -3.65], [99.0, -3.65], [99.0, -6.65], [0.0, -6.65]]]
+    rights = [(c["id"], c["priority"], c["signalled"]) for c in said["crossings"]]
+    assert rights == [("c1", True, False), ("c2", False, True)]
+    assert (said["crossings"][1]["begin_m"], said["crossings"][1]["end_m"]) == (60.0, 64.0)
+    corners = {(40.0, -3.65), (44.0, -3.65), (44.0, 3.65), (40.0, 3.65)}
+    assert {tuple(point) for point in said["crossings"][0]["outline_m"]} == corners
+
+
+def test_a_body_is_on_the_carriageway_by_its_centre(
+    scene: Scene, scene_snapshot: Callable[..., Snapshot]
+) -> None:
+    """Whether it moves onto it, stands there or leaves it; on the open plane all are on it."""
+    places = [(60.0, -5.15, 1.4, 1.57), (60.0, -3.5, 1.4, 1.57), (60.0, -3.5, 0.0, 1.57)]
+    lines = protocol.Observations(scene)
+    seen = [
+        json.loads(lines.line(scene_snapshot(scene, (10.0, 8.0), [place], step=i)))["bodies"][0]
+        for i, place in enumerate([*places, places[2], places[0]])
+    ]
+    assert [body["on_carriageway"] for body in seen] == [False, True, True, True, False]
+    plane = dataclasses.replace(scene, roads=None)
+    said = observed(plane, scene_snapshot(plane, (10.0, 8.0), [places[0]]))
+    assert said["bodies"][0]["on_carriageway"] is True
+
+
+def test_the_acceleration_is_that_of_the_last_timestep(
+    scene: Scene, scene_snapshot: Callable[..., Snapshot]
+) -> None:
+    """Of its speeds in two observations; 0 in the first one of an episode."""
+    lines = protocol.Observations(scene)
+    speeds = 8.0, 7.5, 7.5, 7.75
+    said = [
+        json.loads(lines.line(scene_snapshot(scene, (10.0, v), step=i)))
+        for i, v in enumerate(speeds)
+    ]
+    found = [message["ego"]["acceleration_mps2"] for message in said]
+    assert found == pytest.approx([0.0, -5.0, 0.0, 2.5])
 
 
 def test_every_number_reads_back_as_itself(
@@ -90,6 +153,7 @@ def test_an_observation_shows_everybody(
         "y_m": 2.0,
         "heading_rad": math.pi,
         "speed_mps": 5.0,
+        "on_carriageway": True,
     }
     assert said["ego"]["along_m"] == 10.0
     assert said["ego"]["lateral_m"] == 0.0
@@ -200,9 +264,15 @@ def test_the_documented_exchange_is_what_is_really_said(
     ours = [json.loads(text) for side, text in said if side == ">"]
     replies = [text.encode() for side, text in said if side == "<"]
     mission = Mission(
-        Path("/home/me/networks/road.net.xml"), ("east",), PATH, LIGHTS[:1], 0.1, 60.0
+        Path("/home/me/networks/road.net.xml"),
+        ("east",),
+        PATH,
+        LIGHTS[:1],
+        0.1,
+        60.0,
+        surroundings=ROAD,
     )
-    scene = Scene(scene.dt, scene.ego, PATH, scene.bodies, scene.starts, None, LIGHTS[:1], 7)
+    scene = dataclasses.replace(scene, lights=LIGHTS[:1])
     lines = protocol.Observations(scene)
     now = scene_snapshot(scene, (10.0, 8.0), [(60.0, -5.15, 1.4, math.pi / 2)])._replace(
         lights=("r",)

@@ -8,11 +8,15 @@ from __future__ import annotations
 
 import json
 import math
+from collections.abc import Sequence
 from typing import Any
+
+import shapely
 
 from cavsumo.egos.base import Acceleration, Drive, Mission
 from cavsumo.errors import EgoError
 from cavsumo.model.bodies import Body, Kind
+from cavsumo.model.carriageway import MarkedCrossing
 from cavsumo.model.scene import Scene
 from cavsumo.model.snapshot import RawState, Snapshot
 
@@ -57,10 +61,37 @@ def hello(mission: Mission, kind: Kind) -> bytes:
                 "steering_max_rad": kind.steering_max,
             },
             "network": str(mission.net.resolve()),
-            "route": {"edges": mission.edges, "points_m": mission.path.points},
+            "route": {
+                "edges": mission.edges,
+                "points_m": mission.path.points,
+                "lanes": [
+                    {"from_m": r.along, "width_m": r.width, "speed_limit_mps": r.speed}
+                    for r in mission.surroundings.route
+                ],
+            },
             "traffic_lights": [{"id": t.id, "stop_line_m": t.along} for t in mission.lights],
+            "crossings": [_crossing(crossing) for crossing in mission.crossings],
+            "lanes": [
+                {"id": lane.id, "left_m": lane.left, "right_m": lane.right}
+                for lane in mission.surroundings.lanes
+            ],
+            "pavements_m": mission.surroundings.pavements,
         }
     )
+
+
+def _crossing(crossing: MarkedCrossing) -> dict[str, Any]:
+    """A marked crossing on the route."""
+    return {
+        "id": crossing.id,
+        "begin_m": crossing.begin,
+        "end_m": crossing.end,
+        "priority": crossing.priority,
+        "signalled": crossing.signalled,
+        "outline_m": [
+            [round(x, 3), round(y, 3)] for x, y in shapely.get_coordinates(crossing.surface)[:-1]
+        ],
+    }
 
 
 def reset(seed: int) -> bytes:
@@ -74,6 +105,7 @@ class Observations:
     def __init__(self, scene: Scene) -> None:
         self._scene = scene
         self._half = scene.ego.kind.length / 2
+        self._speed: float | None = None  # of the ego in the last observation
         # The object of each body up to its numbers, its last state and the whole object then. By
         # identity, which is quick to look up; the state keeps the body, so that no other one takes
         # its identity.
@@ -83,23 +115,37 @@ class Observations:
         """The observation of one timestep."""
         _, x, y, v, o = snapshot.ego
         here = self._scene.ego_projection(snapshot)
-        bodies = [self._body(raw) for raw in (*snapshot.testers, *snapshot.raw_background)]
+        states = (*snapshot.testers, *snapshot.raw_background)
+        bodies = map(self._body, states, self._on_carriageway(states))
+        gained = 0.0 if self._speed is None else (v - self._speed) / self._scene.dt
+        self._speed = v
         return (
             f'{{"type":"observation","step":{snapshot.step},"time_s":{_f(snapshot.time)},'
             f'"ego":{{"x_m":{_f(x)},"y_m":{_f(y)},"heading_rad":{_f(o)},"speed_mps":{_f(v)},'
+            f'"acceleration_mps2":{_f(gained)},'
             f'"steering_rad":{_f(snapshot.ego_steering)},"along_m":{_f(here.along)},'
             f'"lateral_m":{_f(here.lateral)}}},'
             f'"traffic_light":{self._light(snapshot, here.along + self._half)},'
             f'"bodies":[{",".join(bodies)}]}}\n'
         ).encode()
 
-    def _body(self, state: RawState) -> str:
+    def _on_carriageway(self, states: Sequence[RawState]) -> Sequence[bool]:
+        """Whether each body's centre is on a carriageway; the open plane is one."""
+        roads = self._scene.roads
+        if roads is None:
+            return [True] * len(states)
+        return roads.contain([state[1] for state in states], [state[2] for state in states])
+
+    def _body(self, state: RawState, on_carriageway: bool) -> str:
         body, x, y, v, o = state
         known = self._known.get(id(body))
         if known is not None and known[1] == state:
             return known[2]  # it stands
         head = _head(body) if known is None else known[0]
-        text = f'{head}{_f(x)},"y_m":{_f(y)},"heading_rad":{_f(o)},"speed_mps":{_f(v)}}}'
+        text = (
+            f'{head}{_f(x)},"y_m":{_f(y)},"heading_rad":{_f(o)},"speed_mps":{_f(v)},'
+            f'"on_carriageway":{"true" if on_carriageway else "false"}}}'
+        )
         self._known[id(body)] = head, state, text
         return text
 
