@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from cavsumo.api.results import Results as Results
     from cavsumo.api.results import load as load
     from cavsumo.api.running import run as run
+    from cavsumo.api.suites import suite as suite
     from cavsumo.assertions.base import Assertion as Assertion
     from cavsumo.assertions.base import Judgement as Judgement
     from cavsumo.egos.base import Acceleration as Acceleration
@@ -37,6 +38,7 @@ __version__ = "0.1.0"
 _PUBLIC = {
     "run": "api.running",
     "load": "api.results",
+    "suite": "api.suites",
     "Results": "api.results",
     "RecordedEpisode": "api.episodes",
     "Scenario": "model.scenario",

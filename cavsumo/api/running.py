@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping
-from dataclasses import replace
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -16,6 +16,7 @@ from cavsumo.batch.preflight import checked
 from cavsumo.batch.progress import is_shown
 from cavsumo.errors import InputError
 from cavsumo.model.named_networks import DEFAULT
+from cavsumo.model.objects import SentObject
 from cavsumo.model.scenario import Scenario
 from cavsumo.model.scenario_file import read_config
 from cavsumo.model.study import Part, overruled
@@ -66,33 +67,52 @@ def run(
     if config is not None:
         given = overruled(read_config(Path(config)), given)
     manner = Manner(resume, retry_errors, overwrite, quiet=not (progress and is_shown()))
-    means = _means(jobs, executor, scheduler)
-    if output is None and (resume or retry_errors):
+    said = ", ".join(f"{key}={value!r}" for key, value in given.items())
+    part = Part("", dict(given), {"net": DEFAULT})
+    order = Order(part, f"cavsumo.run({said})", manner, means_of(jobs, executor, scheduler))
+    return results_of(order, output, objects)
+
+
+@dataclass(frozen=True)
+class Order:
+    """A batch that a call asks for: what, the call as text, and how it is played."""
+
+    part: Part
+    call: str
+    manner: Manner
+    means: Means
+
+
+def results_of(
+    order: Order, output: str | os.PathLike[str] | None, objects: Sequence[SentObject]
+) -> Results:
+    """The results of a batch that is played into a file, or into a temporary one."""
+    manner = order.manner
+    if output is None and (manner.resume or manner.retry_errors):
         raise InputError("run: resume and retry_errors go on with an output; none is given")
     if output is not None:
-        _play(given, Path(output), means, manner)
+        _play(order, Path(output))
         return Results(Path(output), trusted=True, objects=tuple(objects))
     folder = TemporaryFolder()
     try:
-        _play(given, folder.path / FILE, means, manner)
+        _play(order, folder.path / FILE)
     except BaseException:
         folder.close()
         raise
     return Results(folder.path / FILE, trusted=True, folder=folder, objects=tuple(objects))
 
 
-def _means(jobs: int | None, executor: Any, scheduler: str | None) -> Means:
+def means_of(jobs: int | None, executor: Any, scheduler: str | None) -> Means:
     """How the episodes are played."""
     if executor is not None:
         return Means(jobs, executor, scheduler)
     return Means(jobs, "local" if scheduler is None else "dask", scheduler)
 
 
-def _play(settings: Mapping[str, Any], file: Path, means: Means, manner: Manner) -> None:
+def _play(order: Order, file: Path) -> None:
     """Play a batch into a file."""
-    (batch,) = checked([Part("", dict(settings), {"net": DEFAULT})], file, manner)
-    said = ", ".join(f"{key}={value!r}" for key, value in settings.items())
-    manifest = {**batch.manifest, "command": [], "call": f"cavsumo.run({said})"}
-    _, interrupted = played([replace(batch, manifest=manifest)], means, manner)
+    (batch,) = checked([order.part], file, order.manner)
+    manifest = {**batch.manifest, "command": [], "call": order.call}
+    _, interrupted = played([replace(batch, manifest=manifest)], order.means, order.manner)
     if interrupted:
         raise KeyboardInterrupt

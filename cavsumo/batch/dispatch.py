@@ -166,6 +166,8 @@ class _Line:
             raise
         except Exception as error:  # such as dask's KilledWorker
             said = f"the executor lost it: {type(error).__name__}: {error}"
-            plan = self.prepared.plan
-            answers = [Answer(failed(plan, j, said, 0.0), j.memory) for j in self._jobs(entry)]
+            plan_of = self.prepared.plan_of
+            answers = [
+                Answer(failed(plan_of(j.run), j, said, 0.0), j.memory) for j in self._jobs(entry)
+            ]
         return [answer for answer in answers if answer.outcome.row["run"] in entry.wanted]

@@ -22,6 +22,7 @@ from cavsumo.results.reading import check_cells, inside, rows_of
 from cavsumo.results.recorded_plan import plan_in, recorded_plan
 from cavsumo.results.rows import cell
 from cavsumo.results.traces import NOT_REPLAYED, Trace, parsed, read_trace
+from cavsumo.suites.cases import case_plan
 
 
 @dataclass(frozen=True)
@@ -84,7 +85,7 @@ def recorded(csv_file: Path, run: int, allowed: Collection[str] | None = ()) -> 
     plan, manifest = recorded_plan(csv_file)
     row = recorded_row(csv_file, run)
     trace = read_trace(inside(csv_file, row["trace"])) if row.get("trace") else None
-    return Record(plan, row, trace, manifest, csv_file, allowed=allowed)
+    return Record(case_plan(plan, run), row, trace, manifest, csv_file, allowed=allowed)
 
 
 def recorded_row(csv_file: Path, run: int) -> dict[str, str]:

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from cavsumo.agents.casting import teams, tester_bodies
 from cavsumo.assertions.base import Assertion
 from cavsumo.assertions.specs import assertions_of
-from cavsumo.egos import make_ego
 from cavsumo.egos.base import Ego, Mission
+from cavsumo.egos.specs import ego_of
 from cavsumo.model.bodies import Body
 from cavsumo.model.scenario import Scenario
 from cavsumo.network.site import Site
@@ -48,7 +48,7 @@ class Setup:
 
 def make_setup(scenario: Scenario, site: Site, ego: Ego | None = None) -> Setup:
     """The setup of a scenario, with an ego of its own unless one is given."""
-    ego = ego or make_ego(scenario.ego, scenario.ego_params)
+    ego = ego or ego_of(scenario)
     return Setup(
         scenario=scenario,
         world=World(scenario, site, ego),

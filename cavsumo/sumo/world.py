@@ -33,8 +33,10 @@ from cavsumo.network.site import Site
 from cavsumo.sumo.background import Background, Roaming, roaming
 from cavsumo.sumo.connection import Simulations
 from cavsumo.sumo.demand import DepartureNotes
+from cavsumo.sumo.guided import GuidedEgo
 from cavsumo.sumo.poses import from_sumo, front
 from cavsumo.sumo.reseeding import reseed
+from cavsumo.sumo.vehicle_types import type_of
 
 EGO = "ego"
 ENTRY_S = 30.0  # longest wait of the ego for room to enter the network
@@ -144,6 +146,8 @@ class World:
         self._commanded = False
         self._vehicles: tuple[str, ...] = ()
         self._departures: DepartureNotes | None = None
+        script = self.scenario.script
+        self._guided = None if script is None else GuidedEgo(libsumo, script, self.ego_body)
         if simulation == "same":
             self._check_own()
         _PLAYING[0] = self._mark
@@ -278,7 +282,8 @@ class World:
     def _insert(self, states: Sequence[BodyState], starts: Sequence[Start]) -> None:
         """Add the ego and the testers, each at its place before the first timestep."""
         route = self.site.route
-        speed = self.ego.depart_speed
+        # That of a script enters standing, which SUMO always allows, and then has its speed.
+        speed = self.ego.depart_speed if self._guided is None else 0.0
         libsumo.vehicle.add(
             EGO,
             "cavsumo_ego",
@@ -294,8 +299,9 @@ class World:
                 libsumo.person.add(state.id, edges[0], 0.0, typeID="cavsumo_person")
                 libsumo.person.appendWalkingStage(state.id, list(edges), 0.0)
             else:
-                kind = state.body.kind.name
-                libsumo.vehicle.add(state.id, _route_of(start), typeID=f"cavsumo_{kind}")
+                libsumo.vehicle.add(
+                    state.id, _route_of(start), typeID=type_of(self.scenario, state.body)
+                )
         self._place(states)
 
     def _enter(self, states: Sequence[BodyState]) -> BodyState:
@@ -309,11 +315,18 @@ class World:
                 for state in states:
                     if not self._is_person(state):
                         libsumo.vehicle.setSpeedMode(state.id, UNSAFE)
-                return ego
+                return ego if self._guided is None else self._approach(self._guided, states)
             self._place(states)
         raise SimulationError(
             f"the ego found no room to enter edge {self.site.route.edges[0]!r} in {ENTRY_S:g} s"
         )
+
+    def _approach(self, ego: GuidedEgo, states: Sequence[BodyState]) -> BodyState:
+        """Give the ego of a script its speed."""
+        ego.enter()
+        self._place(states)
+        self._advance()
+        return ego.begin()
 
     def _make_room(self, states: Sequence[BodyState], starts: Sequence[Start]) -> None:
         """Remove traffic that SUMO inserted at the place of a tester vehicle.
@@ -359,6 +372,8 @@ class World:
     def _command_ego(self, command: Command) -> None:
         """Pass on the ego's command; None leaves the ego to SUMO."""
         if command is None:
+            if self._guided is not None:
+                self._guided.release()
             return
         if not self._commanded:  # its first command may come late, when another driver takes over
             self._commanded = True
@@ -402,6 +417,8 @@ class World:
         self._vehicles = vehicle.getIDList()
         if EGO not in self._vehicles:
             return None
+        if self._guided is not None:
+            return self._guided.state()
         x, y = vehicle.getPosition(EGO)
         x, y, o = from_sumo(x, y, vehicle.getAngle(EGO), self.ego_body.kind.length)
         return BodyState(self.ego_body, x, y, vehicle.getSpeed(EGO), o)

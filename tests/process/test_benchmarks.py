@@ -73,6 +73,15 @@ def test_every_benchmark_is_played_here() -> None:
     assert scripts == set(re.findall(r'play\(\s*"(\w+)"', here))
 
 
+def test_reference_tracks(play: Play) -> None:
+    """One cell: the largest differences are within the tolerances."""
+    test, everything = play("reference_tracks", "--only", "CPFA/60/50").splitlines()[1:]
+    assert (test.split()[:2], everything.split()[0]) == (["CPFA", "1"], "all")
+    place, speed = numbers(everything)[1:]
+    assert place < 0.05
+    assert speed < 0.05
+
+
 def test_avoidable(play: Play) -> None:
     """One ego, one agent, both reference drivers."""
     said = play("avoidable", "--runs", "1", "-j", "1", EGOS=("constant",), AGENTS=("random",))
