@@ -11,7 +11,8 @@ rewarded for wasting it. A body must not, before the verdict:
   other bodies, so background traffic that does not see it has no consequence;
 * get into the standing ego and still be there when that drives on;
 * leave the world: on foot farther than STRAY_M from carriageways and pavements, vehicles farther
-  than OFF_ROAD_M from the carriageway, unless at the end of its way out of the network;
+  than OFF_ROAD_M from the carriageway, unless at the end of its way out of the network or in a
+  scripted test, which says where its bodies are;
 * move as its kind cannot. Actions cannot do that, but states set directly could.
 """
 
@@ -148,7 +149,7 @@ class ValidityMonitor:
     def _in_world(self, i: int, body: BodyState) -> bool:
         """Whether a body is inside the world."""
         roads, on_foot = self._scene.roads, body.body.kind.name in WALKING
-        if roads is None:
+        if roads is None or self._scene.script is not None:  # a script says where bodies are
             self._known[i] = body.x, body.y, math.inf
             return True
         far = roads.walking_distance if on_foot else roads.driving_distance

@@ -33,9 +33,17 @@ class Bend(NamedTuple):
 
 
 class PlaneCurve:
-    """A way that begins at a pose; before it and after its last leg it is prolonged straight on."""
+    """A way that begins at a pose; before it and after its last leg it is prolonged straight on.
 
-    def __init__(self, begin: Pose, legs: Sequence[Bend] = ()) -> None:
+    Args:
+        begin: where it begins.
+        legs: one after another.
+        apart: distance of the points [m] between which it is straight and its heading changes
+            evenly, from the beginning on; None for the smooth curve.
+    """
+
+    def __init__(self, begin: Pose, legs: Sequence[Bend] = (), apart: float | None = None) -> None:
+        self._apart = apart
         self.legs = tuple(leg for leg in legs if leg.length > 0.0)
         self._starts = [0.0, *accumulate(leg.length for leg in self.legs)]
         self._poses = [begin]
@@ -49,6 +57,15 @@ class PlaneCurve:
 
     def at(self, along: float) -> Pose:
         """The pose at an arc length [m], also before the beginning and after the end."""
+        if self._apart is None or not 0.0 < along < self.length:
+            return self._smooth(along)
+        share, i = math.modf(along / self._apart)
+        before, after = (self._smooth(k * self._apart) for k in (i, i + 1.0))
+        x, y = (a + share * (b - a) for a, b in zip(before[:2], after[:2], strict=True))
+        return x, y, wrap(before[2] + share * wrap(after[2] - before[2]))
+
+    def _smooth(self, along: float) -> Pose:
+        """The pose on the smooth curve."""
         last = len(self.legs)
         i = next((i for i in range(last) if along < self._starts[i + 1]), last)
         if along <= 0.0 or i == last:

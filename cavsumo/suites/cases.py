@@ -71,7 +71,8 @@ class SuiteCases:
         except ValueError as error:
             raise InputError(f"{place}: {error}") from error
         shared = {key: getattr(base, key) for key in Scenario.model_fields if key != "script"}
-        case = {"net": self.net(cell.test.net), "ego_route": cell.test.ego_route, "end": end}
+        route = [names.get(edge, edge) for edge in cell.test.ego_route]
+        case = {"net": self.net(cell.test.net), "ego_route": route, "end": end}
         return Scenario(**{**shared, **case, "script": script}).placed(base.places)
 
     def net(self, name: str) -> Path:
@@ -79,9 +80,9 @@ class SuiteCases:
         beside = self.folder / name
         return beside if beside.is_file() else Path(name)
 
-    def nets(self) -> dict[str, tuple[str, ...]]:
-        """The networks of the selected cases, each with a route on it."""
-        return {str(self.net(cell.test.net)): cell.test.ego_route for cell in self.cells}
+    def nets(self) -> list[str]:
+        """The networks of the selected cases."""
+        return list(dict.fromkeys(str(self.net(cell.test.net)) for cell in self.cells))
 
     def _names(self, cell: SuiteCell, layer: int) -> Names:
         """The names that the expressions of a case may use, variations drawn."""

@@ -15,6 +15,7 @@ Value = bool | int | float | str
 FUNCTIONS: Mapping[str, Callable[..., float]] = {
     "abs": abs,
     "acos": math.acos,
+    "atan": math.atan,
     "cos": math.cos,
     "deg": math.radians,  # degrees, as radians
     "kmh": lambda speed: speed / 3.6,  # km/h, as m/s

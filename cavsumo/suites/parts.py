@@ -34,7 +34,7 @@ def suite_part(name: str, chosen: Mapping[str, Any], settings: Mapping[str, Any]
     cases = SuiteCases(suite, choice, file.parent, int(settings.get("seed", 1)))
     own = {"reference": "none", "assertions": ["collision"], **suite.settings}
     fixed = {
-        "net": str(next(iter(cases.nets()))),
+        "net": cases.nets()[0],
         "routes": "none",
         "suite": choice.model_dump(mode="json"),
         "runs": len(cases),

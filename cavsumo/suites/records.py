@@ -53,6 +53,7 @@ class SuiteTest(SuiteRecord):
     """A test: where it takes place, its cells, and what everybody does.
 
     Attributes:
+        ego_route: edges, or parameters whose values are edges.
         case: parameters of which a case's name is made, after the test's.
         values: named expressions, each of which may use those before it.
         ego, testers: as in a script (``model/scenario/script``), with expressions for numbers and

@@ -20,6 +20,7 @@ REFERENCES = TRACKS.reference_tracks()
 CELLS = (
     *("CPNA/10/75", "CPNA/60/25", "CPFA/30/50", "CPNCO/50/50", "CPLA/10/50", "CPLA/60/50"),
     *("CBNA/20/50", "CBNAO/60/75", "CBNAO/10/50", "CBFA/60/25", "CBLA/20/50"),
+    *("CCRs/10/0", "CCRs/50/75", "CCFtap/10/45", "CCFtap/20/60", "CCFhos/30/50/75"),
 )
 
 

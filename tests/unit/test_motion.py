@@ -48,6 +48,18 @@ def test_an_arc_is_a_circle() -> None:
     assert curve.at(curve.length + 2.0) == pytest.approx((9.0, 11.0, math.pi / 2))
 
 
+def test_a_way_by_points_is_straight_between_them() -> None:
+    """It passes through the points of the smooth way, and its heading changes evenly."""
+    legs = [Bend(3.0, 0.0, 0.0), Bend(6.0, 0.0, 1 / 9.0)]
+    smooth = PlaneCurve((0.0, 0.0, 0.0), legs)
+    pointed = PlaneCurve((0.0, 0.0, 0.0), legs, 1.0)
+    before, after = smooth.at(7.0), smooth.at(8.0)
+    assert pointed.at(7.0) == pytest.approx(before)
+    middle = [(a + b) / 2 for a, b in zip(before, after, strict=True)]
+    assert pointed.at(7.5) == pytest.approx(middle)
+    assert pointed.at(20.0) == smooth.at(20.0)
+
+
 def test_a_clothoid_is_the_integral_of_its_curvature() -> None:
     """Against a sum over small steps; its polyline has its length."""
     curve = PlaneCurve((1.0, 2.0, 0.3), [Bend(6.0, 0.0, 1 / 9.0), Bend(6.0, 1 / 9.0, 0.0)])

@@ -56,6 +56,9 @@ class ScriptedWay(ScriptPart):
     y_m: Finite = 0.0
     heading_rad: Finite = 0.0
     legs: tuple[Leg, ...] = ()
+    points_m: Finite | None = Field(
+        None, gt=0.01, description="distance of points between which it is straight; else smooth"
+    )
 
     @cached_property
     def curve(self) -> PlaneCurve:
@@ -65,7 +68,7 @@ class ScriptedWay(ScriptPart):
             for leg in self.legs
             for last in (leg.to_curvature,)
         ]
-        return PlaneCurve((self.x_m, self.y_m, self.heading_rad), bends)
+        return PlaneCurve((self.x_m, self.y_m, self.heading_rad), bends, self.points_m)
 
 
 class SpeedChange(ScriptPart):
