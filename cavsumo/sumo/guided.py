@@ -2,7 +2,8 @@
 
 SUMO or the ego's controller decides how fast it drives, and SUMO counts the distance that it has
 driven; where it is follows from that, on the way of the script. SUMO's own lanes are its guide to
-leaders and traffic rules only. Until the test begins, SUMO's driver keeps the speed of the test.
+leaders and traffic rules only. Until shortly before the test (``begins_m``) SUMO's driver, which
+dawdles, keeps the speed of the test.
 """
 
 from __future__ import annotations
@@ -50,7 +51,7 @@ class GuidedEgo:
         return self.state()
 
     def release(self) -> None:
-        """Leave the speed to SUMO's driver once the test begins."""
+        """Leave the speed to SUMO's driver once it is near enough."""
         if self._held and self._front() >= self._script.begins_m:
             self._held = False
             self._sumo.vehicle.setSpeedMode(self._body.id, ALL_CHECKS)

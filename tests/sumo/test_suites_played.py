@@ -112,7 +112,7 @@ def test_an_ego_without_the_speed_of_the_test_is_a_row_that_says_so(tmp_path: Pa
     played = cavsumo.suite(NAME, Brakes(200.0), output=tmp_path / "a.csv", **how)
     (row,) = played.rows.to_dict("records")
     assert row["outcome"] == "error"
-    assert "CPFA/30/50 needs 30.0: nothing was tested" in row["error"]
+    assert "it entered with the speed of CPFA/30/50, 30.0 km/h: it does not hold it" in row["error"]
     assert row["case"] == "CPFA/30/50"
 
 

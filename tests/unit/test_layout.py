@@ -30,7 +30,7 @@ ROOMS = {
         "simulation": "model network agents assertions egos sumo",
         "results": "model suites network agents assertions egos sumo simulation",
         "batch": "model suites network agents assertions egos sumo simulation results",
-        "report": "model network assertions egos results batch",
+        "report": "model suites network assertions egos results batch",
         "interop": "model network sumo results",
         "api": "model suites network batch report results",
         "envs": "model network agents assertions egos simulation results batch",

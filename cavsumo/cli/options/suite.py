@@ -73,8 +73,12 @@ def _fill(suite: argparse.ArgumentParser) -> None:
     batch = suite.add_argument_group("batch")
     for key in KEYS:
         add_setting(batch.add_argument, offered[key])
-    for title in ("processes", "output"):
-        OTHERS[title](suite.add_argument_group(title).add_argument)
+    OTHERS["processes"](suite.add_argument_group("processes").add_argument)
+    output = suite.add_argument_group("output")
+    OTHERS["output"](output.add_argument)
+    output.add_argument(
+        "--html", type=Path, metavar="FILE", help="also write the grid of each test as a page"
+    )
 
 
 def _suite(options: argparse.Namespace) -> int:
@@ -106,7 +110,7 @@ def _suite(options: argparse.Namespace) -> int:
     # What can be refused quickly has been; now comes what takes long to import.
     from cavsumo.cli.commands.suite import play_suite
 
-    return play_suite(batches, means, manner)
+    return play_suite(batches, means, manner, options.html)
 
 
 def speeds_of(text: str | None) -> list[float]:

@@ -31,7 +31,7 @@ from cavsumo.model.scenario.sensor import Finite
 
 Length = Annotated[float, Field(gt=0, le=50, allow_inf_nan=False)]
 Speed = Annotated[float, Field(ge=0, le=100, allow_inf_nan=False)]
-FOUR_S = 4.0  # a test begins at this time to collision, unless a tester commits earlier
+FOUR_S = 4.0  # time to the nominal contact; until then SUMO's driver keeps the speed of the test
 FAST_MPS2 = 1000.0  # limit of a programmed body's throttle: its places are prescribed
 
 
@@ -181,7 +181,7 @@ class EgoApproach(ScriptPart):
     length_m: Length | None = Field(None, description="length of its box; its own if not given")
     width_m: Length | None = Field(None, description="width of its box; its own if not given")
     meets_m: Finite = Field(0.0, description="arc length of its front at the nominal contact [m]")
-    tolerance_mps: Finite = Field(0.3, gt=0, description="of its speed when the test begins")
+    tolerance_mps: Finite = Field(0.3, gt=0, description="of its speed after it entered")
 
     @model_validator(mode="after")
     def _moves(self) -> Self:
@@ -220,9 +220,9 @@ class ScriptedTest(ScriptPart):
 
     @cached_property
     def begins_m(self) -> float:
-        """Arc length of the ego's front at which the test begins, with its nominal speed [m].
+        """Arc length of the ego's front from which on SUMO's driver decides its speed [m].
 
-        Four seconds before the nominal contact, or when the first tester commits.
+        Four seconds before the nominal contact, or where the first tester commits.
         """
         v, marks = self.ego.speed_mps, [self.ego.meets_m - FOUR_S * self.ego.speed_mps]
         for tester in self.testers:
