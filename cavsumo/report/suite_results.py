@@ -65,7 +65,7 @@ class CaseResult:
             return NOT_JUDGED
         if self.avoided or self.share is None:
             return AVOIDED
-        return next((name for limit, name in BANDS if self.share <= limit), LAST_BAND)
+        return next((name for limit, name in BANDS if self.share <= limit + 1e-6), LAST_BAND)
 
 
 @dataclass(frozen=True)
@@ -93,7 +93,7 @@ class SuiteTestResult:
 
 @dataclass(frozen=True)
 class SuiteTold:
-    """The words of a page about a suite: its titles, the ego, the results file, the tests' titles."""
+    """The words of a page about a suite: titles, the ego, the results file, the tests' titles."""
 
     title: str
     source: str
