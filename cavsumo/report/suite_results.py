@@ -23,6 +23,7 @@ from cavsumo.suites.cases import cases_of
 AVOIDED, NOT_JUDGED = "avoided", "not judged"
 # Upper limits of the bands of the impact speed, as shares of the test's speed.
 BANDS = ((0.25, "up to a quarter"), (0.5, "to half"), (0.75, "to three quarters"))
+PREVENTABLE = "preventable"  # the parameter that says whether a reference avoids a case
 LAST_BAND = "above three quarters"
 
 
@@ -38,6 +39,7 @@ class CaseResult:
         impact: speed of the ego at contact [km/h]; None without one.
         speed: of the test [km/h].
         why: why it is not judged.
+        preventable: whether the reference of the suite avoids it; None where the suite has none.
     """
 
     run: int
@@ -47,6 +49,7 @@ class CaseResult:
     impact: float | None
     speed: float
     why: str = ""
+    preventable: bool | None = None
 
     @property
     def test(self) -> str:
@@ -80,6 +83,7 @@ class SuiteTestResult:
         mean_share: the same as a share of the test's speed, 0 for an avoided case; None without
             a case.
         not_judged: how many are not judged.
+        preventable: impacts that the reference of the suite avoids; None where the suite has none.
     """
 
     test: str
@@ -89,6 +93,7 @@ class SuiteTestResult:
     worst_impact: float | None
     mean_share: float | None
     not_judged: int
+    preventable: int | None = None
 
 
 @dataclass(frozen=True)
@@ -141,6 +146,7 @@ def _case(row: Mapping[str, Any], speed: str) -> CaseResult:
         impact,
         float(parameters.get(speed, "nan")),
         why,
+        float(parameters[PREVENTABLE]) > 0.5 if PREVENTABLE in parameters else None,
     )
 
 
@@ -149,6 +155,7 @@ def result_of(test: str, cases: Sequence[CaseResult]) -> SuiteTestResult:
     judged = [case for case in cases if case.avoided is not None]
     impacts = [case.impact for case in judged if case.impact is not None]
     shares = [case.share or 0.0 for case in judged]
+    told = [case for case in judged if case.preventable is not None]
     return SuiteTestResult(
         test,
         len(judged),
@@ -157,6 +164,7 @@ def result_of(test: str, cases: Sequence[CaseResult]) -> SuiteTestResult:
         max(impacts, default=None),
         sum(shares) / len(shares) if shares else None,
         len(cases) - len(judged),
+        sum(case.impact is not None for case in told if case.preventable) if told else None,
     )
 
 
@@ -170,11 +178,12 @@ def results_of_tests(cases: Sequence[CaseResult]) -> list[SuiteTestResult]:
 def suite_table(cases: Sequence[CaseResult]) -> str:
     """The table at the end of a suite: a line for each test."""
     head = ["test", "cases", "avoided", "share", "mean impact", "worst impact", "of test speed"]
-    rows = [head, *(_cells(one) for one in results_of_tests(cases))]
-    if any(case.avoided is None for case in cases):
-        rows[0].append("not judged")
-        for row, one in zip(rows[1:], results_of_tests(cases), strict=True):
-            row.append(str(one.not_judged))
+    results = results_of_tests(cases)
+    rows = [head, *(_cells(one) for one in results)]
+    if any(one.preventable is not None for one in results):
+        _append(rows, "preventable", [one.preventable for one in results])
+    if any(one.not_judged for one in results):
+        _append(rows, "not judged", [one.not_judged for one in results])
     widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
     return "\n".join(
         "  ".join(
@@ -183,6 +192,12 @@ def suite_table(cases: Sequence[CaseResult]) -> str:
         ).rstrip()
         for row in rows
     )
+
+
+def _append(rows: list[list[str]], title: str, numbers: Sequence[int | None]) -> None:
+    """Add a column of counts."""
+    for row, word in zip(rows, [title, *numbers], strict=True):
+        row.append("" if word is None else str(word))
 
 
 def _cells(one: SuiteTestResult) -> list[str]:

@@ -122,7 +122,8 @@ def _script(suite: Suite, cell: SuiteCell, names: Names, layer: int) -> Scripted
     """The script of a case."""
     ego = _evaluated({**suite.ego, **cell.test.ego}, names)
     testers = [_evaluated(_boxed(suite, table), names) for table in cell.test.testers]
-    shown = (*cell.parameters, *cell.test.vary_by, *cell.test.vary_times)
+    test = cell.test
+    shown = (*cell.parameters, *test.shown, *test.vary_by, *test.vary_times)
     parameters = {"test": cell.test.name, **{key: names[key] for key in shown}, "variation": layer}
     content = {"name": cell.name, "parameters": parameters, "ego": ego, "testers": testers}
     return ScriptedTest.model_validate(content)

@@ -37,8 +37,7 @@ def all_cells(suite: Suite) -> Iterator[SuiteCell]:
     """All cells of a suite, in the order of its file."""
     for test in suite.tests:
         for cells in test.cells:
-            options = [v if isinstance(v, list) else [v] for v in cells.values.values()]
-            for values in itertools.product(*options):
+            for values in itertools.product(*cells.options()):
                 parameters = dict(zip(cells.values, values, strict=True))
                 name = case_name(test, parameters)
                 yield SuiteCell(test, name, parameters, cells.range == EXTENDED)

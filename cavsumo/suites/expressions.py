@@ -9,14 +9,24 @@ from collections.abc import Callable, Mapping
 from typing import Any
 
 from cavsumo.errors import UnknownName
+from cavsumo.suites import careful_driver
 
 Value = bool | int | float | str
+
+
+def _one_if(truth: Callable[..., bool]) -> Callable[..., float]:
+    """A function whose answer is 1 or 0."""
+    return lambda *numbers: float(truth(*numbers))
+
 
 FUNCTIONS: Mapping[str, Callable[..., float]] = {
     "abs": abs,
     "acos": math.acos,
     "atan": math.atan,
     "cos": math.cos,
+    "cut_in_preventable": _one_if(careful_driver.cut_in_preventable),
+    "cut_out_preventable": _one_if(careful_driver.cut_out_preventable),
+    "deceleration_preventable": _one_if(careful_driver.deceleration_preventable),
     "deg": math.radians,  # degrees, as radians
     "kmh": lambda speed: speed / 3.6,  # km/h, as m/s
     "max": max,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, model_validator
@@ -31,11 +32,32 @@ class SuiteBody(SuiteRecord):
     front_m: float | None = None
 
 
+class EvenSteps(SuiteRecord):
+    """Numbers in even steps, both ends included."""
+
+    first: float = Field(alias="from")
+    last: float = Field(alias="to")
+    by: float = Field(1.0, gt=0)
+
+    def numbers(self) -> list[Value]:
+        """The numbers; whole ones as whole numbers."""
+        count = math.floor((self.last - self.first) / self.by + 1e-6) + 1
+        found = [round(self.first + i * self.by, 9) for i in range(max(0, count))]
+        return [int(number) if number.is_integer() else number for number in found]
+
+
 class Cells(SuiteRecord):
     """A block of cases: all combinations of the values of some parameters."""
 
     range: Literal["standard", "extended"] = "standard"
-    values: dict[str, list[Value] | Value] = Field(default_factory=dict)
+    values: dict[str, EvenSteps | list[Value] | Value] = Field(default_factory=dict)
+
+    def options(self) -> list[list[Value]]:
+        """The values of each parameter."""
+        return [
+            one.numbers() if isinstance(one, EvenSteps) else one if isinstance(one, list) else [one]
+            for one in self.values.values()
+        ]
 
     @model_validator(mode="before")
     @classmethod
@@ -56,6 +78,7 @@ class SuiteTest(SuiteRecord):
         ego_route: edges, or parameters whose values are edges.
         case: parameters of which a case's name is made, after the test's.
         values: named expressions, each of which may use those before it.
+        shown: values that are shown with the parameters in results.
         ego, testers: as in a script (``model/scenario/script``), with expressions for numbers and
             ``body`` for a box of the suite.
         vary_by, vary_times: what ``--vary`` draws: by name the smallest and the largest number
@@ -70,6 +93,7 @@ class SuiteTest(SuiteRecord):
     case: tuple[str, ...] = ()
     cells: tuple[Cells, ...] = Field(min_length=1)
     values: dict[str, Number] = Field(default_factory=dict)
+    shown: tuple[str, ...] = ()
     vary_by: dict[str, tuple[float, float]] = Field(default_factory=dict)
     vary_times: dict[str, tuple[float, float]] = Field(default_factory=dict)
     ego: dict[str, Any] = Field(default_factory=dict)

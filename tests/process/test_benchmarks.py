@@ -82,6 +82,12 @@ def test_reference_tracks(play: Play) -> None:
     assert speed < 0.05
 
 
+def test_un_r157(play: Play) -> None:
+    """The grid of decelerations, without a collision, as published."""
+    (line,) = play("un_r157", "--test", "deceleration").splitlines()[1:]
+    assert line.split() == ["deceleration", "1,121", "0", "0"]
+
+
 def test_avoidable(play: Play) -> None:
     """One ego, one agent, both reference drivers."""
     said = play("avoidable", "--runs", "1", "-j", "1", EGOS=("constant",), AGENTS=("random",))

@@ -95,6 +95,19 @@ class Brakes:
         return Acceleration(-8.0 if near else 0.0)
 
 
+def test_a_car_that_cuts_in_has_its_gap_and_its_lateral_speed(tmp_path: Path) -> None:
+    """When it has it, and afterwards it is in the ego's lane; the case says what is preventable."""
+    how: dict[str, Any] = {"trace": "all", "progress": False, "output": tmp_path / "a.csv"}
+    cut_in = cavsumo.suite("un-r157", "constant", only="cut-in/50/20/25/1.5", **how)
+    track = TRACKS.played_track(tmp_path / "a" / "run000000.jsonl")
+    ego, other = next(pair for pair in track.states if pair[0][0] >= 3.0 - 1e-9)
+    assert other[1] - ego[1] - 4.3 == pytest.approx(25.0, abs=0.02)
+    after = [pair[1] for pair in track.states if 3.1 < pair[0][0] < 4.0]
+    assert after[5][2] - after[0][2] == pytest.approx(5 * 0.1 * 1.5, abs=0.01)
+    assert track.states[-1][1][2] == pytest.approx(-1.75, abs=0.05)
+    assert cut_in.cases["preventable"].tolist() == [1]
+
+
 def test_the_target_commits_once(tmp_path: Path) -> None:
     """It walks on as it began, although the ego brakes."""
     how: dict[str, Any] = {"only": "CPFA/30/50", "trace": "all", "progress": False}

@@ -56,8 +56,8 @@ class ScriptedWay(ScriptPart):
     y_m: Finite = 0.0
     heading_rad: Finite = 0.0
     legs: tuple[Leg, ...] = ()
-    points_m: Finite | None = Field(
-        None, gt=0.01, description="distance of points between which it is straight; else smooth"
+    points_m: Annotated[float, Field(gt=0.01, allow_inf_nan=False)] | None = Field(
+        default=None, description="distance of points between which it is straight; else smooth"
     )
 
     @cached_property
