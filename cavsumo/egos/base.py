@@ -46,6 +46,7 @@ class Mission:
         lights: the traffic lights on it.
         dt: length of a timestep [s].
         horizon: longest duration of an episode [s].
+        approach_speed: at which it enters and is to drive [m/s]; None leaves it to the ego.
     """
 
     net: Path
@@ -54,6 +55,7 @@ class Mission:
     lights: tuple[Light, ...]
     dt: float
     horizon: float
+    approach_speed: float | None = None
 
 
 class Ego:

@@ -8,6 +8,7 @@ judged.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -24,6 +25,7 @@ AVOIDED, NOT_JUDGED = "avoided", "not judged"
 # Upper limits of the bands of the impact speed, as shares of the test's speed.
 BANDS = ((0.25, "up to a quarter"), (0.5, "to half"), (0.75, "to three quarters"))
 PREVENTABLE = "preventable"  # the parameter that says whether a reference avoids a case
+ALLOWED = "allowed_kmh"  # and that which says how fast an impact may be
 LAST_BAND = "above three quarters"
 
 
@@ -40,6 +42,7 @@ class CaseResult:
         speed: of the test [km/h].
         why: why it is not judged.
         preventable: whether the reference of the suite avoids it; None where the suite has none.
+        allowed: impact speed that the suite allows [km/h]; None where it says nothing.
     """
 
     run: int
@@ -50,6 +53,12 @@ class CaseResult:
     speed: float
     why: str = ""
     preventable: bool | None = None
+    allowed: float | None = None
+
+    @property
+    def within(self) -> bool:
+        """Whether it is avoided, or its impact no faster than allowed."""
+        return bool(self.avoided) or (self.impact or math.inf) <= (self.allowed or 0.0)
 
     @property
     def test(self) -> str:
@@ -84,6 +93,7 @@ class SuiteTestResult:
             a case.
         not_judged: how many are not judged.
         preventable: impacts that the reference of the suite avoids; None where the suite has none.
+        within: cases within the limit of the suite; None where it has none.
     """
 
     test: str
@@ -94,6 +104,7 @@ class SuiteTestResult:
     mean_share: float | None
     not_judged: int
     preventable: int | None = None
+    within: int | None = None
 
 
 @dataclass(frozen=True)
@@ -147,6 +158,7 @@ def _case(row: Mapping[str, Any], speed: str) -> CaseResult:
         float(parameters.get(speed, "nan")),
         why,
         float(parameters[PREVENTABLE]) > 0.5 if PREVENTABLE in parameters else None,
+        float(parameters[ALLOWED]) if ALLOWED in parameters else None,
     )
 
 
@@ -156,6 +168,7 @@ def result_of(test: str, cases: Sequence[CaseResult]) -> SuiteTestResult:
     impacts = [case.impact for case in judged if case.impact is not None]
     shares = [case.share or 0.0 for case in judged]
     told = [case for case in judged if case.preventable is not None]
+    limited = [case for case in judged if case.allowed is not None]
     return SuiteTestResult(
         test,
         len(judged),
@@ -165,6 +178,7 @@ def result_of(test: str, cases: Sequence[CaseResult]) -> SuiteTestResult:
         sum(shares) / len(shares) if shares else None,
         len(cases) - len(judged),
         sum(case.impact is not None for case in told if case.preventable) if told else None,
+        sum(case.within for case in limited) if limited else None,
     )
 
 
@@ -182,6 +196,8 @@ def suite_table(cases: Sequence[CaseResult]) -> str:
     rows = [head, *(_cells(one) for one in results)]
     if any(one.preventable is not None for one in results):
         _append(rows, "preventable", [one.preventable for one in results])
+    if any(one.within is not None for one in results):
+        _append(rows, "within limit", [one.within for one in results])
     if any(one.not_judged for one in results):
         _append(rows, "not judged", [one.not_judged for one in results])
     widths = [max(map(len, column)) for column in zip(*rows, strict=True)]

@@ -38,7 +38,11 @@ class Setup:
     def mission(self) -> Mission:
         """The data that the ego has before its first episode."""
         site, route, horizon = self.site, self.site.route, self.scenario.end
-        return Mission(site.net, route.edges, route.path, site.lights, self.world.dt, horizon)
+        script = self.scenario.script
+        speed = None if script is None else script.ego.speed_mps
+        return Mission(
+            site.net, route.edges, route.path, site.lights, self.world.dt, horizon, speed
+        )
 
     def close(self) -> None:
         """End the ego and the simulation."""

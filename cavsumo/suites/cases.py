@@ -24,6 +24,7 @@ from cavsumo.suites.expressions import Value, evaluated
 from cavsumo.suites.files import FOLDER, read_suite, suite_file
 from cavsumo.suites.records import Suite
 
+CHECKED = 2000  # cases of a batch that are made before the first is played
 WORDS = frozenset({"kind", "body"})  # keys whose values are words, not expressions
 
 Names = dict[str, Value]
@@ -105,13 +106,15 @@ class SuiteCases:
 def _variation(cell: SuiteCell, layer: int, seed: int) -> Callable[[str, Value], Value]:
     """The function that varies a named value in one layer; the first layer varies nothing."""
     by, times = cell.test.vary_by, cell.test.vary_times
+    if layer == 0:
+        return lambda name, value: value
     words = seed, zlib.crc32(cell.name.encode()), layer
     rng = np.random.default_rng(np.random.SeedSequence(words))
     added = {name: float(rng.uniform(*limits)) for name, limits in by.items()}
     factors = {name: float(rng.uniform(*limits)) for name, limits in times.items()}
 
     def varied(name: str, value: Value) -> Value:
-        if layer == 0 or (name not in added and name not in factors):
+        if name not in added and name not in factors:
             return value
         return float(value) * factors.get(name, 1.0) + added.get(name, 0.0)
 
@@ -190,5 +193,12 @@ def suite_inputs(plan: BatchPlan) -> dict[str, Path]:
 
 
 def case_plans(plan: BatchPlan) -> Iterator[BatchPlan]:
-    """The plans of all runs, one after another."""
-    yield from (case_plan(plan, run) for run in range(len(cases_of(plan))))
+    """The plans of the runs, one after another; of thousands some of each test.
+
+    All cells of a test are made by the same expressions.
+    """
+    cases = cases_of(plan)
+    apart = 1 + len(cases) // CHECKED
+    first = {cell.test.name: i for i, cell in reversed(list(enumerate(cases.cells)))}
+    for run in sorted({*first.values(), *range(0, len(cases), apart)}):
+        yield case_plan(plan, run)

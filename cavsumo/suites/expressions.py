@@ -6,6 +6,7 @@ import ast
 import math
 import operator
 from collections.abc import Callable, Mapping
+from functools import lru_cache
 from typing import Any
 
 from cavsumo.errors import UnknownName
@@ -53,19 +54,24 @@ def evaluated(text: str, names: Mapping[str, Value]) -> Value:
     ``+ - * / **``, brackets, numbers, names and the functions of ``FUNCTIONS``; ValueError in
     plain words for anything else, UnknownName for a name that there is not.
     """
-    if len(text) > LONGEST:
-        raise ValueError(f"an expression of more than {LONGEST} characters")
     try:
-        tree = ast.parse(text.strip(), mode="eval").body
-    except (SyntaxError, ValueError, RecursionError, MemoryError):
-        raise ValueError(f"no expression: {text!r}") from None
-    try:
-        value = _value(tree, names, text)
+        value = _value(_parsed(text), names, text)
     except (ArithmeticError, TypeError) as error:
         raise ValueError(f"{text!r} has no value: {error}") from error
     if isinstance(value, complex) or (isinstance(value, float) and not math.isfinite(value)):
         raise ValueError(f"{text!r} has no finite value")
     return value  # type: ignore[no-any-return]
+
+
+@lru_cache(maxsize=4096)
+def _parsed(text: str) -> ast.AST:
+    """The tree of an expression."""
+    if len(text) > LONGEST:
+        raise ValueError(f"an expression of more than {LONGEST} characters")
+    try:
+        return ast.parse(text.strip(), mode="eval").body
+    except (SyntaxError, ValueError, RecursionError, MemoryError):
+        raise ValueError(f"no expression: {text!r}") from None
 
 
 def _value(node: ast.AST, names: Mapping[str, Value], text: str) -> Any:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from functools import lru_cache
+from functools import cache, lru_cache
 from pathlib import Path
 
 from pydantic import ValidationError
@@ -16,9 +16,10 @@ ENDING = ".toml"
 FOLDER = Path(__file__).parent
 
 
-def suite_names() -> list[str]:
+@cache
+def suite_names() -> tuple[str, ...]:
     """The suites that come with cavsumo."""
-    return sorted(file.stem for file in FOLDER.glob(f"*{ENDING}"))
+    return tuple(sorted(file.stem for file in FOLDER.glob(f"*{ENDING}")))
 
 
 def suite_file(name: str, places: Mapping[str, Path] | None = None) -> Path:

@@ -73,6 +73,16 @@ def test_the_table_has_a_line_for_each_test_and_one_for_all() -> None:
     assert "not judged" not in suite_table(CASES[:2])
 
 
+def test_a_suite_may_know_what_is_preventable_and_what_is_allowed() -> None:
+    """Each has a column of its own."""
+    told = [dict(one, parameters=f"{one['parameters']} preventable=1.0") for one in ROWS[:2]]
+    head, line = suite_table(case_results(told)).splitlines()
+    assert (head.split()[-1], line.split()[-1]) == ("preventable", "1")
+    limits = [dict(one, parameters=f"{one['parameters']} allowed_kmh=10") for one in ROWS[:3]]
+    head, line = suite_table(case_results(limits)).splitlines()
+    assert (head.split()[-2:], line.split()[-1]) == (["within", "limit"], "2")
+
+
 def test_the_page_has_a_grid_for_each_test_in_the_order_of_the_suite() -> None:
     """Rows are speeds, columns the rest of the names; the worst variation colours a cell."""
     page = suite_page(TOLD, CASES)
