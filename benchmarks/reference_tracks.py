@@ -5,6 +5,7 @@
 The tracks (tests/data/ncap_*.json) are the published OpenSCENARIO files, played by esmini with an
 ego that keeps its speed. Both are compared where the boxes are 20, 10, 5 and 2 m apart and at
 contact, by interpolation between their timesteps; a track begins four seconds before contact.
+``impact``: how far the target's reference point is from the nominal one at contact.
 """
 
 from __future__ import annotations
@@ -17,12 +18,15 @@ from collections import defaultdict
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import cavsumo
 from cavsumo.model.geometry import Box, gap
 from cavsumo.results.traces import read_trace
+from cavsumo.suites.files import read_suite, suite_file
+from cavsumo.suites.records import SuiteBody
 
+SUITE = read_suite(suite_file("euroncap-2026"))
 DATA = Path(__file__).resolve().parents[1] / "tests" / "data"
 FILES = ("ncap_vru_standard.json", "ncap_car_standard.json")
 GAPS_M = (20.0, 10.0, 5.0, 2.0, 0.0)
@@ -43,11 +47,12 @@ class Track(NamedTuple):
 
 
 class Seen(NamedTuple):
-    """The target as seen from the middle of the ego's front: place [m] and speed [m/s]."""
+    """The target from the middle of the ego's front: place [m], speed [m/s], relative heading."""
 
     ahead: float
     left: float
     speed: float
+    turn: float
 
 
 def reference_tracks() -> dict[str, Track]:
@@ -116,10 +121,10 @@ def signed_gap(track: Track, pair: tuple[Row, Row]) -> float:
 
 def seen(track: Track, pair: tuple[Row, Row]) -> Seen:
     """The target in one pair of states."""
-    (_, x, y, o, _), (_, tx, ty, _, speed) = pair
+    (_, x, y, o, _), (_, tx, ty, heading, speed) = pair
     dx, dy = tx - x, ty - y
     ahead = dx * math.cos(o) + dy * math.sin(o) - track.ego[0] / 2
-    return Seen(ahead, dy * math.cos(o) - dx * math.sin(o), speed)
+    return Seen(ahead, dy * math.cos(o) - dx * math.sin(o), speed, heading - o)
 
 
 def compared(name: str, played: Track, reference: Track) -> Iterator[tuple[float, float, float]]:
@@ -132,12 +137,12 @@ def compared(name: str, played: Track, reference: Track) -> Iterator[tuple[float
             yield wanted, math.dist(a[:2], b[:2]), abs(a.speed - b.speed)
 
 
-def off_nominal(name: str, results: Mapping[str, Any], track: Track) -> float | None:
-    """How far the impact is from the nominal point on the ego's front [m]; None without one."""
-    share = results.get("impact_percent")
-    if share is None:
-        return None
-    return abs(seen_at(track)[0.0].left - (float(share) / 100.0 - 0.5) * track.ego[1])
+def off_nominal(percent: float, body: SuiteBody, track: Track) -> float:
+    """How far the target's reference point is from the nominal one on the ego's front [m]."""
+    contact = seen_at(track)[0.0]
+    front = body.length_m / 2 if body.front_m is None else body.front_m
+    left = contact.left + (body.length_m / 2 - front) * math.sin(contact.turn)
+    return abs(left - (percent / 100.0 - 0.5) * track.ego[1])
 
 
 def main() -> None:
@@ -163,19 +168,22 @@ def main() -> None:
 
 def table(results: cavsumo.Results, references: Mapping[str, Track]) -> str:
     """A line a test: cases, and the largest differences."""
+    bodies = {test.name: SUITE.bodies[test.testers[0]["body"]] for test in SUITE.tests}
     worst: dict[str, list[tuple[float, ...]]] = defaultdict(list)
-    for case, trace in zip(results.rows["case"], results.rows["trace"], strict=True):
+    for row in results.cases.assign(trace=results.rows["trace"].tolist()).to_dict("records"):
+        case, test = row["case"], row["test"]
         if case in references:
-            track = played_track(results.file.parent / trace)
+            track = played_track(results.file.parent / row["trace"])
             found = list(compared(case, track, references[case]))
-            worst[case.split("/")[0]].append(
-                tuple(max(column) for column in zip(*(f[1:] for f in found), strict=True))
-            )
-    lines = [f"{'test':8}{'cases':>6}{'place [m]':>11}{'speed [m/s]':>13}"]
+            place, speed = (max(column) for column in zip(*(f[1:] for f in found), strict=True))
+            percent = row.get("impact_percent", math.nan)
+            off = 0.0 if math.isnan(percent) else off_nominal(percent, bodies[test], track)
+            worst[test].append((place, speed, off))
+    lines = [f"{'test':8}{'cases':>6}{'place [m]':>11}{'speed [m/s]':>13}{'impact [m]':>12}"]
     everything = list(itertools.chain.from_iterable(worst.values()))
     for test, found in (*worst.items(), ("all", everything)):
-        place, speed = (max(column) for column in zip(*found, strict=True))
-        lines.append(f"{test:8}{len(found):6}{place:11.4f}{speed:13.4f}")
+        place, speed, off = (max(column) for column in zip(*found, strict=True))
+        lines.append(f"{test:8}{len(found):6}{place:11.4f}{speed:13.4f}{off:12.4f}")
     return "\n".join(lines)
 
 

@@ -19,7 +19,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from cavsumo.agents.base import AGENTS, Agent
-from cavsumo.errors import EgoError
+from cavsumo.errors import AgentError, EgoError
 from cavsumo.model.bodies import Action
 from cavsumo.model.curve import PlaneCurve
 from cavsumo.model.kinematics import wrap
@@ -29,6 +29,7 @@ from cavsumo.model.scene import Scene
 from cavsumo.model.snapshot import BodyState, Snapshot
 
 HOLDS_S = 0.5  # an ego that keeps the speed with which it entered for so long holds it
+LATE_S = 0.1  # a body that cannot begin in time by more than that would miss its point
 ROUNDS = 4  # of Newton's method for a steering angle; it converges in two or three
 
 
@@ -42,7 +43,8 @@ class ScriptedAgent(Agent):
         super().reset(scene, owned, rng)
         assert scene.script is not None
         self._script, self._checked = scene.script, False
-        self._followers = [Follower(scene.script.testers[i], scene.dt) for i in owned]
+        testers, begins = scene.script.testers, scene.script.commitments
+        self._followers = [Follower(testers[i], begins[i], scene.dt) for i in owned]
 
     def choose_action(self, snapshot: Snapshot) -> tuple[Action, ...]:
         front, v = front_of_ego(self.scene, snapshot), snapshot.ego.v
@@ -82,12 +84,14 @@ class Follower:
 
     Attributes:
         programme: what it does.
+        begins: when its stages begin; None for never.
         dt: length of a timestep [s].
         begun: when its programme began [s]; infinite before.
         ahead: distance on its way at that moment [m].
     """
 
     programme: Programme
+    begins: Begins | None
     dt: float
     begun: float = math.inf
     ahead: float = 0.0
@@ -105,7 +109,7 @@ class Follower:
 
     def action(self, state: BodyState, time: float, front: float, v: float) -> Action:
         """The action of a timestep; ``front`` and ``v``: the ego's place and speed."""
-        begins, dt = self.programme.begins, self.dt
+        begins, dt = self.begins, self.dt
         if begins is not None and self.begun == math.inf:
             self._commit(begins, time, front, v)
         here, there = self.along(time + dt), self.along(time + 2 * dt)
@@ -116,6 +120,11 @@ class Follower:
     def _commit(self, begins: Begins, time: float, front: float, v: float) -> None:
         """Fix the beginning if it lies within the two timesteps that are decided now."""
         moment = self._moment(begins, time, front, v)
+        if moment < time - LATE_S:
+            raise AgentError(
+                f"a programmed {self.programme.kind} had to begin {time - moment:.1f} s ago to "
+                "arrive with the ego; a script needs an earlier start_m"
+            )
         if moment < time + 2 * self.dt:
             self.begun = max(moment, time + self.dt)
             self.ahead = self.programme.speed_mps * self.begun

@@ -10,6 +10,7 @@ import pytest
 from cavsumo.errors import InputError, UnknownName
 from cavsumo.model.scenario import BatchPlan, Scenario, plan_from
 from cavsumo.model.scenario.suite import SuiteChoice
+from cavsumo.model.scenario_file import read_config
 from cavsumo.suites.cases import SuiteCases, case_plan
 from cavsumo.suites.cells import all_cells, selected_cells
 from cavsumo.suites.expressions import evaluated
@@ -179,6 +180,22 @@ def _parameters(whole: BatchPlan, run: int) -> dict[str, object]:
     script = case_plan(whole, run).scenario.script
     assert script is not None
     return dict(script.parameters)
+
+
+def test_the_documented_suite_and_script_are_read(tmp_path: Path) -> None:
+    """As they stand in docs/suites.md."""
+    text = (Path(__file__).parents[2] / "docs" / "suites.md").read_text(encoding="utf-8")
+    suite, scenario = (part.split("```")[0] for part in text.split("```toml\n")[1:])
+    file = tmp_path / "bus.toml"
+    file.write_text(suite, encoding="utf-8")
+    whole = plan(SuiteChoice(name=str(file), extended=True, vary=1))
+    scripts = [case_plan(whole, run).scenario.script for run in range(whole.runs)]
+    assert [script.name for script in scripts if script][:2] == ["BUS/30/6", "BUS/30/8"]
+    assert len(scripts) == 2 * 12
+    file.write_text(scenario, encoding="utf-8")
+    one = plan_from(read_config(file), "test").scenario
+    assert one.script is not None
+    assert (one.script.name, one.testers) == ("", 1)
 
 
 def test_a_suite_of_ones_own_is_read_from_its_file(tmp_path: Path) -> None:

@@ -27,6 +27,7 @@ from pydantic import BaseModel, ConfigDict, Field, field_validator, model_valida
 from cavsumo.model.bodies import KINDS, Body, Kind
 from cavsumo.model.curve import Bend, PlaneCurve
 from cavsumo.model.motion import Motion, Phase, motion_of, to_speed_by, to_speed_over
+from cavsumo.model.scenario.impact import Front, Straight, impact
 from cavsumo.model.scenario.sensor import Finite
 
 Length = Annotated[float, Field(gt=0, le=50, allow_inf_nan=False)]
@@ -102,20 +103,26 @@ class SpeedChange(ScriptPart):
 
 
 class Begins(ScriptPart):
-    """The moment at which a programme begins: by the ego's place, or by time.
+    """The moment at which a programme begins: by the ego's place, by an impact, or by time.
 
     With ``own_at_m`` the body commits as soon as it must begin to arrive there when the ego, at
-    its present speed, arrives at ``ego_at_m``; else when the ego is there.
+    its present speed, arrives at ``ego_at_m``; else when the ego is there. ``impact`` gives both
+    places, for a body that goes straight: its reference point would meet that share of the ego's
+    front, from the right edge (0) to the left (1).
     """
 
+    impact: Finite | None = Field(None, description="share of the ego's front")
+    front_m: Finite | None = Field(None, description="of the reference point, from its own front")
     ego_at_m: Finite | None = Field(None, description="arc length of the ego's front [m]")
     own_at_m: Finite | None = Field(None, ge=0, description="distance on the body's own way [m]")
     at_s: Finite | None = Field(None, ge=0, description="time since the ego entered [s]")
 
     @model_validator(mode="after")
     def _by_one(self) -> Self:
-        if (self.ego_at_m is None) == (self.at_s is None):
-            raise ValueError("must have ego_at_m or at_s")
+        if [self.ego_at_m, self.at_s, self.impact].count(None) != 2:
+            raise ValueError("must have one of ego_at_m, impact and at_s")
+        if self.front_m is not None and self.impact is None:
+            raise ValueError("front_m needs impact")
         if self.own_at_m is not None and self.ego_at_m is None:
             raise ValueError("own_at_m needs ego_at_m")
         return self
@@ -147,9 +154,6 @@ class Programme(ScriptPart):
     def _moves(self) -> Self:
         if bool(self.stages) != (self.begins is not None):
             raise ValueError("begins and stages go together")
-        own = self.begins.own_at_m if self.begins else None
-        if own is not None and not math.isfinite(self.motion.when(own)):
-            raise ValueError("begins.own_at_m is never reached by its stages")
         return self
 
     @property
@@ -214,6 +218,33 @@ class ScriptedTest(ScriptPart):
         return value
 
     @cached_property
+    def commitments(self) -> tuple[Begins | None, ...]:
+        """When each programme begins, with both places of an impact."""
+        return tuple(self._commitment(tester) for tester in self.testers)
+
+    def _commitment(self, tester: Programme) -> Begins | None:
+        """When a programme begins."""
+        begins, ego, way = tester.begins, self.ego, tester.way
+        if begins is None or begins.impact is None:
+            return begins
+        if ego.width_m is None or ego.length_m is None or way.legs:
+            raise ValueError("begins.impact needs the ego's box, and a way without legs")
+        front = tester.length_m / 2 if begins.front_m is None else begins.front_m
+        pose = way.x_m, way.y_m, way.heading_rad
+        box = Straight(pose, tester.length_m, tester.width_m, front)
+        axle = ego.axle(ego.length_m)
+        at = impact(Front(ego.way.curve, axle, ego.width_m), box, begins.impact, ego.start_m)
+        return Begins(ego_at_m=at[0], own_at_m=at[1])
+
+    @model_validator(mode="after")
+    def _meet(self) -> Self:
+        for tester, begins in zip(self.testers, self.commitments, strict=True):
+            own = begins.own_at_m if begins else None
+            if own is not None and not math.isfinite(tester.motion.when(own)):
+                raise ValueError("begins: its place is never reached by the stages")
+        return self
+
+    @cached_property
     def bodies(self) -> tuple[Body, ...]:
         """The bodies of its testers."""
         return tuple(Body(f"tester{i}", one.body_kind) for i, one in enumerate(self.testers))
@@ -225,8 +256,7 @@ class ScriptedTest(ScriptPart):
         Four seconds before the nominal contact, or where the first tester commits.
         """
         v, marks = self.ego.speed_mps, [self.ego.meets_m - FOUR_S * self.ego.speed_mps]
-        for tester in self.testers:
-            begins = tester.begins
+        for tester, begins in zip(self.testers, self.commitments, strict=True):
             if begins is not None and begins.ego_at_m is not None:
                 needed = 0.0
                 if begins.own_at_m is not None:
