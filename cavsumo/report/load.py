@@ -33,6 +33,7 @@ NUMBERS = (
 )
 WORDS = (
     "agent",
+    "case",
     "outcome",
     "breach",
     "blame",

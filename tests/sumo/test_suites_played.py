@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from pathlib import Path
 from typing import Any
+from xml.etree import ElementTree
 
 import pytest
 from inline import cavsumo as command
@@ -159,3 +160,18 @@ def test_a_parked_car_hides_the_child_from_a_sensor(tmp_path: Path) -> None:
         return next(i for i, v in enumerate(speeds) if v < 11.0)
 
     assert first_braking() < first_braking(ego_sensor={"occlusion": True})
+
+
+def test_a_report_and_junit_know_the_cases(played: cavsumo.Results) -> None:
+    """A case of the suite is a case of JUnit; a page is written; certify says why it cannot."""
+    folder = played.file.parent
+    words = ["report", str(played.file), "--junit", "j.xml", "--html", "r.html", "-o", "r.txt"]
+    done = command(folder, *words)
+    assert done.returncode == 0
+    cases = ElementTree.parse(folder / "j.xml").findall(".//testcase")
+    assert sorted(case.get("name", "") for case in cases) == sorted(CELLS)
+    assert all(case.find("failure") is not None for case in cases)
+    played.suite_page(folder / "grid.html")
+    assert "CPNCO/50/50" in (folder / "grid.html").read_text(encoding="utf-8")
+    done = command(folder, "certify", str(played.file), "0")
+    assert (done.returncode, "holds scripted tests" in done.stderr) == (2, True)

@@ -234,7 +234,7 @@ class ScriptedTest(ScriptPart):
         box = Straight(pose, tester.length_m, tester.width_m, front)
         axle = ego.axle(ego.length_m)
         at = impact(Front(ego.way.curve, axle, ego.width_m), box, begins.impact, ego.start_m)
-        return Begins(ego_at_m=at[0], own_at_m=at[1])
+        return Begins.model_validate({"ego_at_m": at[0], "own_at_m": at[1]})
 
     @model_validator(mode="after")
     def _meet(self) -> Self:
