@@ -90,7 +90,7 @@ def _suite(options: argparse.Namespace) -> int:
     from cavsumo.suites.parts import suite_part
 
     if options.name == LIST:
-        from cavsumo.cli.commands.suite import listing
+        from cavsumo.suites.listing import listing
 
         print(listing(options.listed))
         return 0
