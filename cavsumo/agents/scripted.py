@@ -35,19 +35,21 @@ ROUNDS = 4  # of Newton's method for a steering angle; it converges in two or th
 
 @AGENTS.register("scripted")
 class ScriptedAgent(Agent):
-    """Moves the programmed testers of a suite or a script; it plays in no other scenario."""
+    """Moves the programmed testers of a suite or a script; without one it does nothing."""
 
     sees_background = False
 
     def reset(self, scene: Scene, owned: Sequence[int], rng: np.random.Generator) -> None:
         super().reset(scene, owned, rng)
-        assert scene.script is not None
         self._script, self._checked = scene.script, False
-        testers, begins = scene.script.testers, scene.script.commitments
-        self._followers = [Follower(testers[i], begins[i], scene.dt) for i in owned]
+        if scene.script is not None:
+            testers, begins = scene.script.testers, scene.script.commitments
+            self._followers = [Follower(testers[i], begins[i], scene.dt) for i in owned]
 
     def choose_action(self, snapshot: Snapshot) -> tuple[Action, ...]:
-        front, v = front_of_ego(self.scene, snapshot), snapshot.ego.v
+        if self._script is None:
+            return super().choose_action(snapshot)
+        front, v = front_of_ego(self._script, self.scene, snapshot), snapshot.ego.v
         if not self._checked and snapshot.time >= HOLDS_S - 1e-9:
             self._checked = True
             check_approach(self._script, v)
@@ -67,10 +69,9 @@ def check_approach(script: ScriptedTest, v: float) -> None:
         )
 
 
-def front_of_ego(scene: Scene, snapshot: Snapshot) -> float:
+def front_of_ego(script: ScriptedTest, scene: Scene, snapshot: Snapshot) -> float:
     """Arc length of the ego's front on its way, as scripts count it [m]."""
-    assert scene.script is not None
-    approach, ego = scene.script.ego, snapshot.ego
+    approach, ego = script.ego, snapshot.ego
     half = ego.body.kind.length / 2
     axle = approach.axle(ego.body.kind.length)
     back = axle - half  # of the point that follows the way, from the centre
