@@ -118,7 +118,8 @@ class Results:
         ]
         given = [parameters_of(row) for row in self.rows.to_dict("records")]
         parameters = pandas.DataFrame(given).drop(columns="variation")
-        return pandas.DataFrame(found).join(parameters.apply(_numbers))
+        numbers = {"impact_kmh": float, "share": float}
+        return pandas.DataFrame(found).astype(numbers).join(parameters.apply(_numbers))
 
     @property
     def plan(self) -> BatchPlan:
