@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 from cavsumo.api.keywords import settings_of
@@ -22,6 +22,7 @@ def suite(
     speeds: Sequence[float] = (),
     extended: bool = False,
     vary: int = 0,
+    values: Mapping[str, float] | None = None,
     output: str | os.PathLike[str] | None = None,
     jobs: int | None = None,
     executor: Any = None,
@@ -41,6 +42,7 @@ def suite(
         speeds: of the ego [km/h].
         extended: also the cells beyond the standard range.
         vary: variations of each case besides itself.
+        values: numbers in place of values and sizes of the suite, such as ``{"ego_length": 4.7}``.
         output, jobs, executor, scheduler, progress, resume, retry_errors, overwrite: as for
             ``cavsumo.run``.
         **settings: of the batch: ``ego_params``, ``ego_sensor``, ``seed``, ``trace``,
@@ -58,6 +60,7 @@ def suite(
         "speeds": list(speeds),
         "extended": extended,
         "vary": vary,
+        "values": tuple((values or {}).items()),
     }
     part = suite_part(os.fspath(name), chosen, given)
     manner = Manner(resume, retry_errors, overwrite, quiet=not (progress and is_shown()))

@@ -92,12 +92,15 @@ class SuiteCases:
             front = box.length_m / 2 if box.front_m is None else box.front_m
             sizes = {"length": box.length_m, "width": box.width_m, "front": front}
             names |= {f"{name}_{key}": value for key, value in sizes.items()}
+        given_values = dict(self.choice.values)
+        names |= {name: value for name, value in given_values.items() if name in names}
         varied = _variation(cell, layer, self.seed)
         computed = ((name, value, True) for name, value in suite.values.items())
         given = ((name, value, False) for name, value in cell.parameters.items())
         derived = ((name, value, True) for name, value in test.values.items())
         for name, value, is_expression in (*computed, *given, *derived):
             found = _number(value, names) if is_expression else value
+            found = given_values.get(name, found) if is_expression else found
             names[name] = varied(name, found)
         return names
 
@@ -125,7 +128,7 @@ def _variation(cell: SuiteCell, layer: int, seed: int) -> Callable[[str, Value],
 def _script(suite: Suite, cell: SuiteCell, names: Names, layer: int) -> ScriptedTest:
     """The script of a case."""
     ego = _evaluated({**suite.ego, **cell.test.ego}, names)
-    testers = [_evaluated(_boxed(suite, table), names) for table in cell.test.testers]
+    testers = [_evaluated(_boxed(suite, table, names), names) for table in cell.test.testers]
     test = cell.test
     shown = (*cell.parameters, *test.shown, *test.vary_by, *test.vary_times)
     parameters = {"test": cell.test.name, **{key: names[key] for key in shown}, "variation": layer}
@@ -133,7 +136,7 @@ def _script(suite: Suite, cell: SuiteCell, names: Names, layer: int) -> Scripted
     return ScriptedTest.model_validate(content)
 
 
-def _boxed(suite: Suite, table: Mapping[str, Any]) -> dict[str, Any]:
+def _boxed(suite: Suite, table: Mapping[str, Any], names: Names) -> dict[str, Any]:
     """A tester with the box that it names."""
     table = dict(table)
     name = table.pop("body", None)
@@ -141,8 +144,8 @@ def _boxed(suite: Suite, table: Mapping[str, Any]) -> dict[str, Any]:
         return table
     if name not in suite.bodies:
         raise UnknownName("body", str(name), suite.bodies, "testers")
-    box = suite.bodies[name]
-    return {"kind": box.kind, "length_m": box.length_m, "width_m": box.width_m, **table}
+    sizes = {f"{key}_m": names[f"{name}_{key}"] for key in ("length", "width")}
+    return {"kind": suite.bodies[name].kind, **sizes, **table}
 
 
 def _evaluated(value: Any, names: Names, key: str = "") -> Any:

@@ -7,12 +7,13 @@ from typing import Any
 
 from pydantic import ValidationError
 
-from cavsumo.errors import InputError
+from cavsumo.errors import InputError, UnknownName
 from cavsumo.model.documents import first_problem
 from cavsumo.model.scenario.suite import SuiteChoice
 from cavsumo.model.study import Part
 from cavsumo.suites.cases import SuiteCases
 from cavsumo.suites.files import read_suite, suite_file
+from cavsumo.suites.records import Suite
 
 
 def suite_part(name: str, chosen: Mapping[str, Any], settings: Mapping[str, Any]) -> Part:
@@ -31,6 +32,7 @@ def suite_part(name: str, chosen: Mapping[str, Any], settings: Mapping[str, Any]
         choice = SuiteChoice(name=name, **chosen)
     except ValidationError as error:
         raise InputError(f"suite {name}: {first_problem(error)}") from error
+    _check_values(suite, choice)
     cases = SuiteCases(suite, choice, file.parent, int(settings.get("seed", 1)))
     own = {"reference": "none", "assertions": ["collision"], **suite.settings}
     fixed = {
@@ -40,3 +42,13 @@ def suite_part(name: str, chosen: Mapping[str, Any], settings: Mapping[str, Any]
         "runs": len(cases),
     }
     return Part("", {**own, **settings, **fixed})
+
+
+def _check_values(suite: Suite, choice: SuiteChoice) -> None:
+    """Refuse a number for a value that the suite does not have."""
+    sizes = {f"{body}_{key}" for body in suite.bodies for key in ("length", "width", "front")}
+    values = {name for test in suite.tests for name in test.values}
+    for name, _ in choice.values:
+        if name not in sizes | values | set(suite.values):
+            valid = sizes | values | set(suite.values)
+            raise UnknownName("value", name, valid, f"suite {choice.name}")

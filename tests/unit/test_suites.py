@@ -142,6 +142,19 @@ def test_a_filter_that_leaves_nothing_is_refused(given: dict[str, object], said:
         suite_part(NAME, given, {})
 
 
+def test_values_and_sizes_can_be_set() -> None:
+    """The boxes of all bodies are parameters, and impact points move with them."""
+    values = (("ego_width", 2.0), ("adult_length", 0.5))
+    one = case_plan(plan(SuiteChoice(name=NAME, only=("CPNA/40/75",), values=values)), 0)
+    script = one.scenario.script
+    assert script is not None
+    assert (script.ego.width_m, script.testers[0].length_m) == (2.0, 0.5)
+    assert script.testers[0].begins is not None
+    assert script.testers[0].begins.own_at_m == pytest.approx(4 + 0.5 + 0.36 - 0.25)
+    with pytest.raises(UnknownName, match="ego_width"):
+        suite_part(NAME, {"values": (("ego_widht", 2.0),)}, {})
+
+
 def test_an_unknown_suite_is_refused_with_the_nearest() -> None:
     """As any name."""
     with pytest.raises(UnknownName, match="euroncap-2026"):

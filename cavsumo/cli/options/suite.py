@@ -69,6 +69,14 @@ def _fill(suite: argparse.ArgumentParser) -> None:
         metavar="N",
         help="variations of each case besides itself, within the limits of the suite (default 0)",
     )
+    cases.add_argument(
+        "--set",
+        action="append",
+        type=_number,
+        metavar="NAME=NUMBER",
+        help="a number in place of a value of the suite or of the size of a body, such as "
+        "ego_length=4.7 or adult_width=0.6; repeat for several",
+    )
     offered = {setting.key: setting for setting in settings()}
     batch = suite.add_argument_group("batch")
     for key in KEYS:
@@ -103,6 +111,7 @@ def _suite(options: argparse.Namespace) -> int:
         "speeds": speeds_of(options.speeds),
         "extended": options.extended,
         "vary": options.vary,
+        "values": options.set or (),
     }
     known = [setting for setting in settings() if setting.key in KEYS]
     part = suite_part(options.name, chosen, given(options, known))
@@ -111,6 +120,15 @@ def _suite(options: argparse.Namespace) -> int:
     from cavsumo.cli.commands.suite import play_suite
 
     return play_suite(batches, means, manner, options.html)
+
+
+def _number(word: str) -> tuple[str, float]:
+    """NAME=NUMBER as two."""
+    name, _, text = word.partition("=")
+    try:
+        return name, float(text)
+    except ValueError:
+        raise InputError(f"--set: expected NAME=NUMBER, got {word!r}") from None
 
 
 def speeds_of(text: str | None) -> list[float]:

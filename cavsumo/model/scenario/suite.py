@@ -10,7 +10,7 @@ class SuiteChoice(BaseModel):
 
     ``only``: tests or cases, such as CPNA or CPNA/30/* ; ``speeds``: of the ego, in the unit of
     the suite; ``extended``: also the cells beyond the standard range; ``vary``: variations of each
-    case besides itself.
+    case besides itself; ``values``: numbers in place of values and sizes of the suite.
     """
 
     model_config = ConfigDict(extra="forbid", frozen=True)
@@ -20,3 +20,4 @@ class SuiteChoice(BaseModel):
     speeds: tuple[float, ...] = ()
     extended: bool = False
     vary: int = Field(0, ge=0, le=10_000)
+    values: tuple[tuple[str, float], ...] = ()
