@@ -85,7 +85,15 @@ def recorded(csv_file: Path, run: int, allowed: Collection[str] | None = ()) -> 
     plan, manifest = recorded_plan(csv_file)
     row = recorded_row(csv_file, run)
     trace = read_trace(inside(csv_file, row["trace"])) if row.get("trace") else None
-    return Record(case_plan(plan, run), row, trace, manifest, csv_file, allowed=allowed)
+    own = _case_of(plan, run, trace)
+    return Record(own, row, trace, manifest, csv_file, allowed=allowed)
+
+
+def _case_of(plan: BatchPlan, run: int, trace: Trace | None) -> BatchPlan:
+    """The plan of one run: of a suite that in its trace, for which the suite's file may be gone."""
+    if plan.suite is None or trace is None:
+        return case_plan(plan, run)
+    return plan_in(trace.head, f"trace of run {run}")
 
 
 def recorded_row(csv_file: Path, run: int) -> dict[str, str]:

@@ -175,3 +175,15 @@ def test_a_report_and_junit_know_the_cases(played: cavsumo.Results) -> None:
     assert "CPNCO/50/50" in (folder / "grid.html").read_text(encoding="utf-8")
     done = command(folder, "certify", str(played.file), "0")
     assert (done.returncode, "holds scripted tests" in done.stderr) == (2, True)
+
+
+def test_a_case_of_a_suite_that_is_gone_is_replayed_from_its_trace(tmp_path: Path) -> None:
+    """The file of the user's own suite is not needed for a run with a trace."""
+    file = tmp_path / "mine.toml"
+    original = Path(cavsumo.__file__).parent / "suites" / "r152-pedestrian.toml"
+    file.write_text(original.read_text(encoding="utf-8"), encoding="utf-8")
+    words = ["suite", str(file), "--ego", "constant", "--speeds", "60", "-o", "a.csv", "-q"]
+    assert command(tmp_path, *words).returncode == 1
+    file.unlink()
+    done = command(tmp_path, "replay", "a.csv", "0")
+    assert (done.returncode, "the same" in done.stdout) == (0, True), done.stderr
