@@ -61,6 +61,8 @@ def test_a_case_is_replayed_from_its_results_and_from_its_trace(played: cavsumo.
     """Bit for bit; the trace alone is enough."""
     played.replay(2)
     played.replay(2, playback=True)
+    done = command(played.file.parent, "replay", str(played.file), "2")
+    assert (done.returncode, "sha256" in done.stderr) == (0, False)
     trace = played.file.parent / played.rows["trace"].iloc[2]
     done = command(played.file.parent, "replay", str(trace))
     assert (done.returncode, "the same" in done.stdout) == (0, True)
@@ -187,3 +189,4 @@ def test_a_case_of_a_suite_that_is_gone_is_replayed_from_its_trace(tmp_path: Pat
     file.unlink()
     done = command(tmp_path, "replay", "a.csv", "0")
     assert (done.returncode, "the same" in done.stdout) == (0, True), done.stderr
+    assert "sha256" not in done.stderr

@@ -26,6 +26,8 @@ KEYS = (
     "first",
     "budget_s",
 )
+# Defaults of a suite that are not those of a run.
+OWN = {"step_length": "the suite's", "assertions": "collision", "reference": "none"}
 
 
 def add_suite(commands: Any) -> None:
@@ -44,7 +46,7 @@ def add_suite(commands: Any) -> None:
 def _fill(suite: argparse.ArgumentParser) -> None:
     """Add the options."""
     from cavsumo.cli.options.run import OTHERS
-    from cavsumo.cli.setting_options import add_setting
+    from cavsumo.cli.setting_options import add_setting, meaning
     from cavsumo.model.scenario.fields import settings
 
     suite.add_argument("name", help=f"a suite by name, a file of your own (.toml), or '{LIST}'")
@@ -80,7 +82,8 @@ def _fill(suite: argparse.ArgumentParser) -> None:
     offered = {setting.key: setting for setting in settings()}
     batch = suite.add_argument_group("batch")
     for key in KEYS:
-        add_setting(batch.add_argument, offered[key])
+        own = {"help": f"{meaning(offered[key])} (default: {OWN[key]})"} if key in OWN else {}
+        add_setting(batch.add_argument, offered[key], **own)
     OTHERS["processes"](suite.add_argument_group("processes").add_argument)
     output = suite.add_argument_group("output")
     OTHERS["output"](output.add_argument)
