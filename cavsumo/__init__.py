@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from cavsumo.api.results import load as load
     from cavsumo.api.running import run as run
     from cavsumo.api.running import run_study as run_study
+    from cavsumo.api.suites import suite as suite
     from cavsumo.assertions.base import Assertion as Assertion
     from cavsumo.assertions.base import Judgement as Judgement
     from cavsumo.egos.base import Acceleration as Acceleration
@@ -39,6 +40,7 @@ _PUBLIC = {
     "run": "api.running",
     "run_study": "api.running",
     "load": "api.results",
+    "suite": "api.suites",
     "Results": "api.results",
     "RecordedEpisode": "api.episodes",
     "Scenario": "model.scenario",

@@ -193,8 +193,11 @@ def teams(scenario: Scenario) -> tuple[tuple[int, ...], ...]:
 
 def tester_bodies(scenario: Scenario) -> tuple[Body, ...]:
     """The testers' bodies, as an agent-body-effector model that was validated (Definition 1)."""
-    kind = kind_named(scenario.kind)
-    bodies = tuple(Body(f"tester{i}", kind) for i in range(scenario.testers))
+    if scenario.script is not None:
+        bodies = scenario.script.bodies
+    else:
+        kind = kind_named(scenario.kind)
+        bodies = tuple(Body(f"tester{i}", kind) for i in range(scenario.testers))
     model_of({f"agent{a}": [bodies[i] for i in team] for a, team in enumerate(teams(scenario))})
     return bodies
 

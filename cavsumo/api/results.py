@@ -23,11 +23,14 @@ from cavsumo.model.own_folders import OwnFolder
 from cavsumo.model.scenario import BatchPlan, Scenario
 from cavsumo.report.files import write_report_files
 from cavsumo.report.order import ReportOptions
+from cavsumo.report.pages.suite.page import write_suite_page
+from cavsumo.report.suite_results import cases_in, told_of
 from cavsumo.results.columns import COLUMNS
 from cavsumo.results.failures import preventable_first
 from cavsumo.results.present import placed_scenario
 from cavsumo.results.reading import COMPLETE, read_results, whole_lines
 from cavsumo.results.recorded_plan import recorded_plan
+from cavsumo.results.rows import parameters_of
 
 if TYPE_CHECKING:
     import pandas
@@ -92,6 +95,32 @@ class Results:
         """The rows of failures: preventable ones first, then those that were not judged."""
         found = self.rows[self.rows["outcome"] == "violated"]
         return found.loc[[row["run"] for row in preventable_first(found.to_dict("records"))]]
+
+    @cached_property
+    def cases(self) -> pandas.DataFrame:
+        """The cases of a suite: what became of each, and its parameters.
+
+        ``avoided``: whether the ego touched nobody, None where that is not judged (``why``);
+        ``impact_kmh``: its speed at contact; ``share``: of the speed of the test. InputError for
+        results of no suite.
+        """
+        import pandas
+
+        found = [
+            {
+                "case": one.name,
+                "variation": one.variation,
+                "avoided": one.avoided,
+                "impact_kmh": one.impact,
+                "share": one.share,
+                "why": one.why,
+            }
+            for one in cases_in(self.file)
+        ]
+        given = [parameters_of(row) for row in self.rows.to_dict("records")]
+        parameters = pandas.DataFrame(given).drop(columns="variation")
+        numbers = {"impact_kmh": float, "share": float}
+        return pandas.DataFrame(found).astype(numbers).join(parameters.apply(_numbers))
 
     @property
     def plan(self) -> BatchPlan:
@@ -174,6 +203,13 @@ class Results:
         for problem in write_report_files([self.file], wanted).problems:
             warnings.warn(problem, stacklevel=2)
 
+    def suite_page(self, file: str | os.PathLike[str]) -> None:
+        """Write the results of a suite as a page: the grid of each test, coloured by impact speed.
+
+        Raises InputError for results of no suite, and when the file cannot be written.
+        """
+        write_suite_page(told_of(self.file), cases_in(self.file), Path(file))
+
     def __len__(self) -> int:
         return len(self.rows)
 
@@ -196,6 +232,14 @@ class Results:
         status = str(self.manifest.get("status"))
         words = ["" if self.folder else str(self.file), "" if status in COMPLETE else status]
         return ", ".join(filter(None, words))
+
+
+def _numbers(column: pandas.Series) -> pandas.Series:
+    """A column of words as numbers, where all are."""
+    import pandas
+
+    numbers = pandas.to_numeric(column, errors="coerce")
+    return column if (numbers.isna() & column.notna()).any() else numbers
 
 
 def _path(name: str | os.PathLike[str] | None) -> Path | None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -69,7 +69,8 @@ def run(
         given = overruled(read_config(Path(config)), given)
     part = Part("", given, {"net": DEFAULT})
     manner = Manner(resume, retry_errors, overwrite, quiet=not (progress and is_shown()))
-    (found,) = _played([part], places, output, _means(jobs, executor, scheduler), manner, objects)
+    order = Order((part,), manner, means_of(jobs, executor, scheduler), places=places)
+    (found,) = results_of(order, output, objects)
     return found
 
 
@@ -102,55 +103,63 @@ def run_study(
     given, objects = settings_of(None, settings)
     parts = read_study(Path(config), given)
     manner = Manner(resume, retry_errors, overwrite, quiet=not (progress and is_shown()))
-    means = _means(jobs, executor, scheduler)
-    found = _played(parts, {}, output, means, manner, objects)
+    order = Order(tuple(parts), manner, means_of(jobs, executor, scheduler))
+    found = results_of(order, output, objects)
     return {part.name: results for part, results in zip(parts, found, strict=True)}
 
 
-def _means(jobs: int | None, executor: Any, scheduler: str | None) -> Means:
-    """How the episodes are played."""
-    if executor is not None:
-        return Means(jobs, executor, scheduler)
-    return Means(jobs, "local" if scheduler is None else "dask", scheduler)
+@dataclass(frozen=True)
+class Order:
+    """Batches that a call asks for.
 
-
-def _played(
-    parts: Sequence[Part],
-    places: Mapping[str, Path],
-    output: str | os.PathLike[str] | None,
-    means: Means,
-    manner: Manner,
-    objects: Sequence[SentObject],
-) -> list[Results]:
-    """The results of batches, in a temporary folder without an output.
-
-    ``places`` as in ``Scenario.placed``.
+    Attributes:
+        parts, manner, means: the batches, and how they are played.
+        call: the call as text; empty for that of ``run`` with the settings of each batch.
+        places: as in ``Scenario.placed``.
     """
-    if output is None and (manner.resume or manner.retry_errors):
+
+    parts: Sequence[Part]
+    manner: Manner
+    means: Means
+    call: str = ""
+    places: Mapping[str, Path] = field(default_factory=dict)
+
+
+def results_of(
+    order: Order, output: str | os.PathLike[str] | None, objects: Sequence[SentObject]
+) -> list[Results]:
+    """The results of batches that are played into files, or into a temporary folder."""
+    if output is None and (order.manner.resume or order.manner.retry_errors):
         raise InputError("run: resume and retry_errors go on with an output; none is given")
     folder = TemporaryFolder() if output is None else None
     file = folder.path / FILE if folder is not None else Path(output or FILE)
     try:
-        _play(parts, places, file, means, manner)
+        _play(order, file)
     except BaseException:
         if folder is not None:
             folder.close()
         raise
     return [
         Results(part.output(file), trusted=True, folder=folder, objects=tuple(objects))
-        for part in parts
+        for part in order.parts
     ]
 
 
-def _play(
-    parts: Sequence[Part], places: Mapping[str, Path], file: Path, means: Means, manner: Manner
-) -> None:
+def means_of(jobs: int | None, executor: Any, scheduler: str | None) -> Means:
+    """How the episodes are played."""
+    if executor is not None:
+        return Means(jobs, executor, scheduler)
+    return Means(jobs, "local" if scheduler is None else "dask", scheduler)
+
+
+def _play(order: Order, file: Path) -> None:
     """Play batches into files."""
     batches = []
-    for part, batch in zip(parts, checked(parts, file, manner, places), strict=True):
+    planned = checked(order.parts, file, order.manner, order.places)
+    for part, batch in zip(order.parts, planned, strict=True):
         said = ", ".join(f"{key}={value!r}" for key, value in part.settings.items())
-        manifest = {**batch.manifest, "command": [], "call": f"cavsumo.run({said})"}
-        batches.append(replace(batch, manifest=manifest))
-    _, interrupted = played(batches, means, manner)
+        call = order.call or f"cavsumo.run({said})"
+        batches.append(replace(batch, manifest={**batch.manifest, "command": [], "call": call}))
+    _, interrupted = played(batches, order.means, order.manner)
     if interrupted:
         raise KeyboardInterrupt

@@ -11,7 +11,8 @@ rewarded for wasting it. A body must not, before the verdict:
   other bodies, so background traffic that does not see it has no consequence;
 * get into the standing ego and still be there when that drives on;
 * leave the world: on foot farther than STRAY_M from carriageways and pavements, vehicles farther
-  than OFF_ROAD_M from the carriageway, unless at the end of its way out of the network;
+  than OFF_ROAD_M from the carriageway, unless at the end of its way out of the network or in a
+  scripted test, which says where its bodies are;
 * move as its kind cannot. Actions cannot do that, but states set directly could.
 """
 
@@ -70,6 +71,7 @@ class ValidityMonitor:
         # valid.
         self._known = [(math.inf, math.inf, 0.0)] * len(scene.bodies)
         roads = scene.roads
+        roads = None if scene.script is not None else roads  # a script says where bodies are
         self._worlds = [None if roads is None else _world(roads, b.kind) for b in scene.bodies]
 
     def observe(self, snapshot: Snapshot, pairs: Sequence[Pair]) -> None:

@@ -155,4 +155,5 @@ class _Line:
         except Exception as error:  # such as dask's KilledWorker
             said = f"the executor lost it: {type(error).__name__}: {error}"
             lost = self._job(entry)
-            return Answer(failed(self.prepared.plan, lost, said, 0.0), lost.memory)
+            plan = self.prepared.plan_of(lost.run)
+            return Answer(failed(plan, lost, said, 0.0), lost.memory)

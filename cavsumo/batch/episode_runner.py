@@ -14,8 +14,10 @@ from cavsumo.batch.jobs import Job, Memory, finished
 from cavsumo.batch.messages import Answer
 from cavsumo.batch.prepared import PreparedBatch
 from cavsumo.egos.reference import IDEAL, REFERENCES
+from cavsumo.egos.specs import ego_of
 from cavsumo.errors import CavsumoError, EgoError, plain
 from cavsumo.model.objects import is_instance
+from cavsumo.model.scenario import Scenario
 from cavsumo.model.seeds import episode_seed
 from cavsumo.results.columns import Row, row_of
 from cavsumo.results.frame_text import frame_lines
@@ -27,15 +29,16 @@ from cavsumo.simulation.checkpoints import begun
 from cavsumo.simulation.episode import Episode
 from cavsumo.simulation.loop import EpisodeLoop, played_on
 from cavsumo.simulation.playback import played_back, recorded
-from cavsumo.simulation.setup import make_setup
+from cavsumo.simulation.setup import Setup, make_setup
 
 
 class EpisodeRunner:
     """A batch set up in this process: plays jobs one after another; a context manager."""
 
     def __init__(self, prepared: PreparedBatch) -> None:
-        self.prepared, self.plan = prepared, prepared.plan
-        self.setup = make_setup(prepared.plan.scenario, prepared.site)
+        self.prepared, self.plan = prepared, prepared.plan_of(0)
+        self.setup = self._setup()
+        self._played: Scenario | None = self.plan.scenario  # that of the setup
         self._agents: dict[str, tuple[list[Agent], Memory | None]] = {}
 
     def __enter__(self) -> EpisodeRunner:
@@ -44,9 +47,26 @@ class EpisodeRunner:
     def __exit__(self, *_: object) -> None:
         self.setup.close()
 
+    def _setup(self) -> Setup:
+        """The setup of the present plan."""
+        ego = ego_of(self.plan.scenario)
+        return make_setup(self.plan.scenario, self.prepared.site_of(self.plan, ego), ego)
+
+    def _turn_to(self, run: int) -> None:
+        """Set up the case of a run, if the batch plays a suite."""
+        self.plan = self.prepared.plan_of(run)
+        if self.plan.scenario == self._played:
+            return
+        self.setup.close()
+        self.__dict__.pop("_origin", None)
+        self._played = None
+        self.setup = self._setup()
+        self.setup.ego.prepare(self.setup.mission)
+        self._played = self.plan.scenario
+
     @cached_property
     def _origin(self) -> dict[str, Any]:
-        """The common part of the traces of all episodes."""
+        """The common part of the traces of all episodes, or of those of a case."""
         return origin(self.plan, self.setup.site, self.prepared.checksums)
 
     def try_out(self, *, strict: bool = True) -> None:
@@ -80,6 +100,8 @@ class EpisodeRunner:
         since = time.perf_counter()
         log, seen, checkpoint = "", "", None
         try:
+            if self.prepared.plan.suite is not None:
+                self._turn_to(job.run)
             agents = self.agents_of(job)
             before = _recall(agents)
             record = job.record or self.plan.trace != "none"

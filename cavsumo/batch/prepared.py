@@ -4,11 +4,10 @@ from __future__ import annotations
 
 import dataclasses
 import hashlib
-import math
 import pickle
 import sys
 from collections.abc import Collection, Mapping, Set
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -19,21 +18,26 @@ from cavsumo.agents.casting import Cast, resolve_cast
 from cavsumo.agents.manoeuvres import types_for
 from cavsumo.assertions.specs import assertions_of
 from cavsumo.batch.plan_names import check_names
-from cavsumo.egos import make_ego
 from cavsumo.egos.base import Ego
 from cavsumo.egos.ego_files import data_files, machine
+from cavsumo.egos.specs import ego_of, top_speed
 from cavsumo.errors import InputError
 from cavsumo.model.bodies import WALKING, Kind, kind_named
+from cavsumo.model.checksums import checksum
 from cavsumo.model.objects import SentObject, objects_among
 from cavsumo.model.scenario import BatchPlan, Scenario
 from cavsumo.model.visible_files import is_visible
+from cavsumo.network.scripted_site import ground, scripted_site
 from cavsumo.network.site import Site, Wishes
 from cavsumo.network.site_cache import site_of
 from cavsumo.network.traffic import Volume
 from cavsumo.network.traffic_lights import Pace
 from cavsumo.results.present import input_files
 from cavsumo.results.provenance import checksums, traffic_checksum, unequal, versions
+from cavsumo.suites.cases import case_plan, case_plans, suite_inputs
 from cavsumo.sumo.options import OPTIONS
+
+Ground = tuple[str, tuple[str, ...]]  # a network and the edges of a route on it
 
 BEYOND_S = 60.0  # how far beyond the horizon there must be demand, for waits and overtime
 OUTPUTS = "ego_outputs"  # in a manifest: the files of its command that an ego wrote
@@ -44,12 +48,13 @@ class PreparedBatch:
     """The data that a process needs to play the jobs of a batch.
 
     Attributes:
-        plan, cast, site: the plan, its agents and its place.
+        plan, cast, site: the plan, its agents and its place; of a suite that of the first case.
         folder: the working folder that the plan's files are relative to.
         checksums: of the plan's files, so that a process elsewhere notices different ones.
         versions: of the packages on which results depend.
         machine: the one on which it was prepared; files that an ego writes differ on others.
         objects: the agents, the ego and the assertions that are objects of a Python session.
+        grounds: of a suite, the networks of its cases.
         key: identifies all of it.
     """
 
@@ -61,6 +66,7 @@ class PreparedBatch:
     versions: Mapping[str, str]
     machine: str = field(default_factory=machine)
     objects: tuple[SentObject, ...] = ()
+    grounds: Mapping[Ground, Site] = field(default_factory=dict)
     key: str = field(init=False)
 
     def __post_init__(self) -> None:
@@ -81,13 +87,25 @@ class PreparedBatch:
     def __reduce__(self) -> tuple[Any, ...]:
         return _unpacked, (self.packed,)
 
+    def plan_of(self, run: int) -> BatchPlan:
+        """The plan of one run by itself: of a suite that of its case."""
+        return case_plan(self.plan, run)
+
+    def site_of(self, plan: BatchPlan, ego: Ego) -> Site:
+        """The site of the plan of one run."""
+        if self.plan.suite is None:
+            return self.site
+        assert plan.scenario.script is not None
+        base = self.grounds[_ground_of(plan.scenario)]
+        return scripted_site(base, plan.scenario.script, ego.kind.length)
+
     def check_here(self) -> None:
         """Raise InputError unless this process sees the same inputs and versions.
 
         Files that the ego may have written since are not inputs (``ego_files``).
         """
         self._check_copies()
-        found = {**versions(), **checksums(self.plan.scenario, self.cast.files)}
+        found = {**versions(), **_checksums(self.plan, self.cast)}
         free = self._written_here()
         for name, (there, here) in unequal({**self.versions, **self.checksums}, found):
             if name in free or (there is None and name not in self.versions):
@@ -123,11 +141,8 @@ def _unpacked(packed: bytes) -> PreparedBatch:
     return batch
 
 
-def prepare(plan: BatchPlan, ego: Ego | None = None) -> PreparedBatch:
-    """Check every name and parameter of a plan and derive its site; raises InputError.
-
-    ``ego`` drives instead of the one that the plan names.
-    """
+def _prepared(plan: BatchPlan, ego: Ego | None) -> PreparedBatch:
+    """The prepared batch of a plan with one scenario."""
     scenario = plan.scenario
     check_names(plan)
     cast = resolve_cast(plan)
@@ -142,12 +157,60 @@ def prepare(plan: BatchPlan, ego: Ego | None = None) -> PreparedBatch:
             f"shard {plan.shard}: {' and '.join(sorted(cast.learners))} learns from episode to "
             "episode, in sequence; learn=false plays what was learned"
         )
-    ego = ego or make_ego(scenario.ego, scenario.ego_params)
+    ego = ego or ego_of(scenario)
     if scenario.ego_sensor and type(ego).act is Ego.act:
         raise InputError(
             f"ego_sensor: ego {scenario.ego} is driven by SUMO, which sees everybody; a sensor "
             "needs a controller, such as time-gap"
         )
+    site = _site(plan, kind, ego, cast)
+    objects = objects_among([*plan.cast.values(), scenario.ego, *scenario.assertions])
+    where = str(Path.cwd()), _checksums(plan, cast), versions()
+    return PreparedBatch(plan, cast, site, *where, objects=objects)
+
+
+def prepare(plan: BatchPlan, ego: Ego | None = None) -> PreparedBatch:
+    """Check every name and parameter of a plan and derive its site; raises InputError.
+
+    ``ego`` drives instead of the one that the plan names. Of a suite every case is checked.
+    """
+    if plan.suite is None:
+        return _prepared(plan, ego)
+    first, grounds, checked = None, dict[Ground, Site](), set[tuple[float, ...]]()
+    for one in case_plans(plan):
+        script = one.scenario.script
+        assert script is not None
+        where = _ground_of(one.scenario)
+        if where not in grounds:
+            grounds[where] = ground(one.scenario)
+        box = script.ego.speed_mps, script.ego.length_m or 0.0, script.ego.start_m
+        if first is None or box not in checked:
+            checked.add(box)
+            driver = ego or ego_of(one.scenario)
+            scripted_site(grounds[where], script, driver.kind.length)
+        first = first or _prepared(one, ego)
+    assert first is not None
+    return replace(first, plan=plan, checksums=_checksums(plan, first.cast), grounds=grounds)
+
+
+def _ground_of(scenario: Scenario) -> Ground:
+    """The key of a case's network among those of its suite."""
+    return str(scenario.net), scenario.ego_route
+
+
+def _checksums(plan: BatchPlan, cast: Cast) -> dict[str, str]:
+    """The checksums of a batch's files, those of its suite with its networks included."""
+    found = checksums(plan.scenario, cast.files)
+    if plan.suite is None:
+        return found
+    return found | {name: checksum(file) for name, file in suite_inputs(plan).items()}
+
+
+def _site(plan: BatchPlan, kind: Kind, ego: Ego, cast: Cast) -> Site:
+    """The site of a plan with one scenario; raises InputError where it cannot serve."""
+    scenario = plan.scenario
+    if scenario.script is not None:
+        return scripted_site(ground(scenario), scenario.script, ego.kind.length)
     asked = wishes(plan, kind, ego, {member.manoeuvre for member in cast})
     site = site_of(scenario.net_file, scenario.ego_route, scenario.junction, ego.kind, asked)
     if scenario.embodiment == "person" and not all(area.walk for area in site.areas):
@@ -155,9 +218,7 @@ def prepare(plan: BatchPlan, ego: Ego | None = None) -> PreparedBatch:
     if site.approaches:  # missing room must be found before the first episode
         kinds, rng = [kind] * scenario.testers, np.random.default_rng(plan.seed)
         site.draw(kinds, ego.kind, scenario.start_speed, rng)
-    inputs = checksums(scenario, cast.files)
-    objects = objects_among([*plan.cast.values(), scenario.ego, *scenario.assertions])
-    return PreparedBatch(plan, cast, site, str(Path.cwd()), inputs, versions(), objects=objects)
+    return site
 
 
 def wishes(plan: BatchPlan, kind: Kind, ego: Ego, manoeuvres: Set[str]) -> Wishes:
@@ -173,16 +234,8 @@ def wishes(plan: BatchPlan, kind: Kind, ego: Ego, manoeuvres: Set[str]) -> Wishe
         jaywalk=scenario.jaywalk,
         volume=volume,
         signal=scenario.signal,
-        pace=Pace(ego.depart_speed, _top_speed(ego)),
+        pace=Pace(ego.depart_speed, top_speed(ego)),
     )
-
-
-def _top_speed(ego: Ego) -> float:
-    """The speed that an ego never exceeds [m/s]; SUMO refuses other values than numbers."""
-    try:
-        return min(ego.kind.v_max, float(ego.vtype().get("maxSpeed", math.inf)))
-    except ValueError:
-        return ego.kind.v_max
 
 
 def _check_kind(scenario: Scenario, kind: Kind, cast: Cast) -> None:

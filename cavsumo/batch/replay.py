@@ -16,12 +16,14 @@ from cavsumo.batch.trust import check_trust
 from cavsumo.batch.worker import Worker
 from cavsumo.errors import DivergenceError, ResultsError, shown
 from cavsumo.model.bodies import STEERING, THROTTLE
+from cavsumo.model.named_networks import ENDING, is_named
 from cavsumo.model.scenario import BatchPlan
 from cavsumo.results.columns import COLUMNS, Row
 from cavsumo.results.reading import check_cells, inside, rows_of
 from cavsumo.results.recorded_plan import plan_in, recorded_plan
 from cavsumo.results.rows import cell
 from cavsumo.results.traces import NOT_REPLAYED, Trace, read_trace, trace_of
+from cavsumo.suites.cases import case_plan
 
 
 @dataclass(frozen=True)
@@ -84,7 +86,27 @@ def recorded(csv_file: Path, run: int, allowed: Collection[str] | None = ()) -> 
     plan, manifest = recorded_plan(csv_file)
     row = recorded_row(csv_file, run)
     trace = read_trace(inside(csv_file, row["trace"])) if row.get("trace") else None
-    return Record(plan, row, trace, manifest, csv_file, allowed=allowed)
+    own = _case_of(plan, run, trace)
+    origin = manifest if plan.suite is None else _origin_of(manifest, plan.suite.name, own)
+    return Record(own, row, trace, origin, csv_file, allowed=allowed)
+
+
+def _case_of(plan: BatchPlan, run: int, trace: Trace | None) -> BatchPlan:
+    """The plan of one run: of a suite that in its trace, for which the suite's file may be gone."""
+    if plan.suite is None or trace is None:
+        return case_plan(plan, run)
+    return plan_in(trace.head, f"trace of run {run}")
+
+
+def _origin_of(manifest: Mapping[str, Any], suite: str, own: BatchPlan) -> dict[str, Any]:
+    """The manifest without the checksums of a suite and of the networks of its other cases."""
+
+    def of_others(name: str) -> bool:
+        net = is_named(Path(name)) or ENDING in name
+        return name == suite or (net and name != str(own.scenario.net))
+
+    sums = dict(manifest.get("sha256") or {})
+    return {**manifest, "sha256": {k: v for k, v in sums.items() if not of_others(k)}}
 
 
 def recorded_row(csv_file: Path, run: int) -> dict[str, str]:

@@ -11,6 +11,7 @@ from cavsumo.egos.base import EGO_KIND
 from cavsumo.errors import ResultsError
 from cavsumo.model.bodies import Kind, kind_named
 from cavsumo.model.scenario import BatchPlan, Scenario
+from cavsumo.network.scripted_site import ground, scripted_site
 from cavsumo.network.site import Site, Wishes
 from cavsumo.network.site_cache import site_of
 from cavsumo.results.traces import Trace
@@ -28,6 +29,9 @@ def shown_site(plan: BatchPlan, trace: Trace | None) -> Site:
     InputError.
     """
     scenario, kind = plan.scenario, kind_named(plan.scenario.kind)
+    if scenario.script is not None:
+        length = scenario.script.ego.length_m or _ego_kind(scenario, trace).length
+        return scripted_site(ground(scenario), scenario.script, length)
     types = approach_types(scenario, kind, shown_manoeuvres(plan))
     wishes = Wishes(kind=kind, types=types, jaywalk=scenario.jaywalk)
     ego = _ego_kind(scenario, trace)

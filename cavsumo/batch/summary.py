@@ -24,11 +24,15 @@ WORD = 28  # letters of a name that are not broken
 WIDTH, WIDEST = 120, 1000  # a table cut off at the edge of a narrow terminal would hide figures
 
 
-def summarise(ended: Sequence[Ended]) -> None:
-    """Print the summary of one or several batches on stdout."""
-    console, table = Console(width=WIDTH), _table(ended)
-    least = Measurement.get(console, console.options.update(width=WIDEST), table).minimum
-    console.width = max(WIDTH, least)
+def summarise(ended: Sequence[Ended], head: str = "") -> None:
+    """Print the summary of one or several batches on stdout.
+
+    ``head``: a table in place of that of the agents.
+    """
+    console = Console(width=WIDTH)
+    table = Text(head) if head else _table(ended)
+    least = Measurement.get(console, console.options.update(width=WIDEST), table)
+    console.width = max(WIDTH, least.maximum if head else least.minimum)
     console.print(table, highlight=False)
     if any(len(f.verdicts) > 1 for one in ended for f in one.tally.agents.values()):
         console.print()

@@ -72,7 +72,9 @@ class Worker:
             except _ProcessGone as gone:
                 self._stop()
                 wall = time.perf_counter() - begun
-                return Answer(failed(self.prepared.plan, job, str(gone), wall), job.memory)
+                return Answer(
+                    failed(self.prepared.plan_of(job.run), job, str(gone), wall), job.memory
+                )
 
     def close(self) -> None:
         """End the process: by itself, or at once while another thread waits for it."""

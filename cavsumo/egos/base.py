@@ -49,6 +49,7 @@ class Mission:
         horizon: longest duration of an episode [s].
         crossings: the marked crossings on the route, in order.
         surroundings: the lanes and pavements near it.
+        approach_speed: at which it enters and is to drive [m/s]; None leaves it to the ego.
     """
 
     net: Path
@@ -59,6 +60,7 @@ class Mission:
     horizon: float
     crossings: tuple[MarkedCrossing, ...] = ()
     surroundings: Surroundings = dataclasses.field(default_factory=Surroundings)
+    approach_speed: float | None = None
 
 
 class Ego:

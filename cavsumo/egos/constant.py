@@ -17,7 +17,9 @@ class ConstantEgo(Ego):
 
     sees_background = False
 
-    PARAMETERS: ClassVar[Mapping[str, str]] = {"speed": "the speed it keeps [m/s]"}
+    PARAMETERS: ClassVar[Mapping[str, str]] = {
+        "speed": "the speed it keeps [m/s]; in a scripted test that of the test"
+    }
 
     def __init__(self, speed: float = 6.75) -> None:
         self.speed = number("speed", speed, 0.0, self.kind.v_max)
@@ -25,8 +27,9 @@ class ConstantEgo(Ego):
 
     def reset(self, scene: Scene) -> None:
         self.dt = scene.dt
+        self.kept = self.speed if scene.approach_speed is None else scene.approach_speed
 
     def act(self, snapshot: Snapshot) -> Command:
         # SUMO may still correct the speed on insertion; full throttle or brake brings it back.
-        wanted = (self.speed - snapshot.ego.v) / self.dt
+        wanted = (self.kept - snapshot.ego.v) / self.dt
         return Acceleration(min(self.kind.throttle_max, max(self.kind.throttle_min, wanted)))

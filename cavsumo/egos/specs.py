@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import dataclasses
+import math
 from collections.abc import Callable, Mapping
 from functools import partial
 from pathlib import Path
@@ -11,9 +13,11 @@ from cavsumo.egos.base import EGOS, Ego
 from cavsumo.egos.controller import ControllerEgo, controller_class
 from cavsumo.egos.external.ego import EXTERNAL, command_words
 from cavsumo.egos.names import is_built_in
+from cavsumo.errors import InputError
 from cavsumo.model.objects import Copies, is_object
 from cavsumo.model.plugins import source_file
 from cavsumo.model.registry import Registry
+from cavsumo.model.scenario import Scenario
 from cavsumo.model.visible_files import is_visible
 
 # Forms of an ego's name besides a registered name, for listings.
@@ -35,6 +39,37 @@ def make_ego(spec: str, params: Mapping[str, Any]) -> Ego:
     if is_object(spec) and _leaves_driving_to_sumo(factory):
         return _alone(spec, factory).make(spec, params)
     return ControllerEgo(spec, factory, params)
+
+
+def ego_of(scenario: Scenario) -> Ego:
+    """The ego of a scenario, with the box that its script gives it.
+
+    Raises InputError where it cannot reach the speed at which the script has it approach.
+    """
+    ego, script = make_ego(scenario.ego, scenario.ego_params), scenario.script
+    if script is None:
+        return ego
+    approach = script.ego
+    top = top_speed(ego)
+    if top < approach.speed_mps - approach.tolerance_mps:
+        raise InputError(
+            f"ego {scenario.ego}: drives at most {top * 3.6:.4g} km/h, "
+            f"{script.name or 'the script'} needs {approach.speed_mps * 3.6:.4g}"
+        )
+    ego.kind = dataclasses.replace(
+        ego.kind,
+        length=approach.length_m or ego.kind.length,
+        width=approach.width_m or ego.kind.width,
+    )
+    return ego
+
+
+def top_speed(ego: Ego) -> float:
+    """The speed that an ego never exceeds [m/s]; SUMO refuses other values than numbers."""
+    try:
+        return min(ego.kind.v_max, float(ego.vtype().get("maxSpeed", math.inf)))
+    except ValueError:
+        return ego.kind.v_max
 
 
 def _alone(spec: str, factory: Callable[..., Ego]) -> Registry[Ego]:

@@ -27,7 +27,7 @@ class TimeGapEgo(Ego):
     """Keeps a time gap to bodies in its path and brakes for them (IDM), but ignores signals."""
 
     PARAMETERS: ClassVar[Mapping[str, str]] = {
-        "speed": "desired speed v0 [m/s]",
+        "speed": "desired speed v0 [m/s]; in a scripted test that of the test",
         "time_gap_s": "desired time gap T [s]",
         "standstill_m": "gap kept when standing, s0 [m]",
         "accel": "largest acceleration a_max [m/s2]",
@@ -53,6 +53,7 @@ class TimeGapEgo(Ego):
 
     def reset(self, scene: Scene) -> None:
         self.scene, self.path = scene, scene.ego_path
+        self.desired = self.speed if scene.approach_speed is None else scene.approach_speed
 
     def act(self, snapshot: Snapshot) -> Command:
         v = snapshot.ego.v
@@ -60,7 +61,7 @@ class TimeGapEgo(Ego):
         gap, speed = max(0.01, closest[0]), closest[1]
         approach = v * (v - speed) / (2.0 * math.sqrt(self.accel * self.decel))
         wanted = self.standstill_m + max(0.0, v * self.time_gap_s + approach)
-        a = self.accel * (1.0 - (v / self.speed) ** 4 - (wanted / gap) ** 2)
+        a = self.accel * (1.0 - (v / self.desired) ** 4 - (wanted / gap) ** 2)
         return Acceleration(min(self.accel, max(self.kind.throttle_min, a)))
 
     def _obstacles(self, snapshot: Snapshot) -> Iterator[tuple[float, float]]:

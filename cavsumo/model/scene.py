@@ -11,6 +11,7 @@ import shapely
 from cavsumo.model.bodies import Body
 from cavsumo.model.carriageway import Crossing, Light, Limit, MarkedCrossing, Roads, Start
 from cavsumo.model.polyline import Path, Projection
+from cavsumo.model.scenario.script import ScriptedTest
 from cavsumo.model.snapshot import Snapshot
 from cavsumo.model.surroundings import Surroundings
 
@@ -33,6 +34,7 @@ class Scene:
         surroundings: the lanes and pavements near the ego's path.
         horizon: longest duration of the episode [s]; infinite if not limited.
         seed: of the episode, for code that draws random numbers without a given generator.
+        script: of the programmed testers and of the ego's approach; None without.
     """
 
     dt: float
@@ -46,11 +48,17 @@ class Scene:
     crossings: tuple[MarkedCrossing, ...] = ()
     limits: tuple[Limit, ...] = ()
     horizon: float = math.inf
+    script: ScriptedTest | None = None
     ground: shapely.Geometry | None = field(default=None, repr=False)
     surroundings: Surroundings = field(default_factory=Surroundings, repr=False)
     _progress: list[Any] = field(default_factory=lambda: [None, None], repr=False)
     _glimpse: list[Any] = field(default_factory=lambda: [None, None], repr=False)
     _ways: dict[int, Crossing | None] = field(default_factory=dict, repr=False)
+
+    @property
+    def approach_speed(self) -> float | None:
+        """The speed at which the ego is to approach [m/s]; None leaves it to the ego."""
+        return None if self.script is None else self.script.ego.speed_mps
 
     def way(self, index: int) -> Crossing | None:
         """The way across the road from where a body starts; computed once."""

@@ -314,13 +314,13 @@ def _routed(
 def lanes_along(network: Network, edges: Sequence[Any]) -> list[Any] | None:
     """Lanes that follow each other along the edges, junction interiors included, or None."""
     for lane in driving_lanes(edges[0]):
-        chain = _chain(network, lane, edges[1:])
+        chain = lanes_from(network, lane, edges[1:])
         if chain is not None:
             return chain
     return None
 
 
-def _chain(network: Network, lane: Any, onward: Sequence[Any]) -> list[Any] | None:
+def lanes_from(network: Network, lane: Any, onward: Sequence[Any]) -> list[Any] | None:
     """Depth-first search for lanes from this one over the edges that follow."""
     if not onward:
         return [lane]
@@ -328,7 +328,7 @@ def _chain(network: Network, lane: Any, onward: Sequence[Any]) -> list[Any] | No
         target = link.getToLane()
         if link.getTo() is not onward[0] or not target.allows("passenger"):
             continue
-        rest = _chain(network, target, onward[1:])
+        rest = lanes_from(network, target, onward[1:])
         if rest is not None:
             return [lane, *interior(network, link), *rest]
     return None

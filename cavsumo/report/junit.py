@@ -1,4 +1,7 @@
-"""JUnit XML for continuous integration: a suite per file, a case per agent and assertion."""
+"""JUnit XML for continuous integration: a suite per file, a case per agent and assertion.
+
+Of a suite of tests each of its cases is a case.
+"""
 
 from __future__ import annotations
 
@@ -12,7 +15,7 @@ from typing import Any
 
 import pandas
 
-from cavsumo.assertions.base import VIOLATED
+from cavsumo.assertions.base import HELD, VIOLATED
 from cavsumo.batch import sentences
 from cavsumo.batch.sentences import event
 from cavsumo.batch.summary import interval, percent
@@ -49,6 +52,9 @@ def _suite(batch: Batch, rows: pandas.DataFrame) -> ET.Element:
         own = rows[rows["agent"] == agent]
         group = Group("", agent, "", own, batch.sequential, reference_of([batch]))
         _properties(properties, agent, rates(group))
+        if batch.plan.suite is not None:
+            cases += [_suite_case(batch, row) for row in own.to_dict("records")]
+            continue
         cases += [_case(batch, agent, name, own) for name in batch.plan.scenario.assertions]
         cases += _standing(agent, driving(group))
         cases += _errors(agent, own)
@@ -92,6 +98,22 @@ def _case(batch: Batch, agent: str, assertion: str, rows: pandas.DataFrame) -> E
         valid = int((~rows["outcome"].isin(("error", "invalid"))).sum())
         message = f"no test of it in {valid} valid episodes: nothing is known"
         ET.SubElement(case, "skipped", message=message)
+    return case
+
+
+def _suite_case(batch: Batch, row: Mapping[Any, Any]) -> ET.Element:
+    """One case of a suite: avoided, failed, not played, or left out because a tester failed."""
+    test, name = row["case"].partition("/")[0], row["case"]
+    case = ET.Element("testcase", classname=_legal(test), name=_legal(name))
+    case.set("time", f"{row['wall_s']:.3f}")
+    if row["outcome"] == VIOLATED:
+        told = _replay(batch, row, row["assertion"])
+        _add(case, "failure", told, told, row["assertion"])
+    elif row["outcome"] == "error":
+        _add(case, "error", row["error"], row["error"], "error")
+    elif row["outcome"] != HELD:
+        message = f"run {row['run']}: {row['outcome']} {row['breach']}".strip()
+        ET.SubElement(case, "skipped", message=_legal(message))
     return case
 
 

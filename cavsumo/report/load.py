@@ -37,6 +37,7 @@ NUMBERS = (
 )
 WORDS = (
     "agent",
+    "case",
     "outcome",
     "breach",
     "blame",

@@ -10,6 +10,7 @@ from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING, Any
 
 from cavsumo.assertions.judgement import INVALID, VIOLATED, Judgement
+from cavsumo.model.scenario.script import ScriptedTest
 from cavsumo.results.column import Column, FinishedEpisode, Measured
 
 if TYPE_CHECKING:
@@ -71,6 +72,22 @@ def verdicts_cell(verdicts: Mapping[str, str]) -> str:
     return " ".join(f"{name}={verdict}" for name, verdict in verdicts.items())
 
 
+def parameters_cell(parameters: Mapping[str, Any]) -> str:
+    """Parameters as one cell; ``rows.parameters_of`` parses it."""
+    said = {k: f"{v:.6g}" if isinstance(v, float) else str(v) for k, v in parameters.items()}
+    return " ".join(f"{name}={value}" for name, value in said.items())
+
+
+def _scripted(value: Callable[[ScriptedTest], str]) -> Callable[[FinishedEpisode], Any]:
+    """A value of the script; empty for an episode without one."""
+
+    def cell(done: FinishedEpisode) -> str | None:
+        script = done.plan.scenario.script
+        return None if script is None else value(script)
+
+    return cell
+
+
 def _foretold(value: Callable[[Forecast], Any], none: Any = None) -> Measured:
     """A value of the tester's forecast."""
     return Measured(lambda episode: value(episode.forecast) if episode.forecast else none)
@@ -107,6 +124,22 @@ _ALL = (
     Column("agent", "tester agent", "", lambda f: f.agent, words=True),
     Column("ego", "vehicle under test", "", lambda f: f.plan.scenario.ego, words=True),
     Column("testers", "number of tester bodies", "", lambda f: f.plan.scenario.testers),
+    Column(
+        "case",
+        "the case of a suite, as TEST/ego speed/...; empty outside of suites",
+        "",
+        _scripted(lambda script: script.name),
+        words=True,
+        since="0.2",
+    ),
+    Column(
+        "parameters",
+        "its parameters: NAME=VALUE, with blanks between; variation 0 is the case as published",
+        "",
+        _scripted(lambda script: parameters_cell(script.parameters)),
+        words=True,
+        since="0.2",
+    ),
     Column(
         "reset",
         "fresh: in a simulation of its own, always since 0.2; shared: in one that other episodes "

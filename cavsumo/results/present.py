@@ -17,6 +17,7 @@ from cavsumo.errors import InputError
 from cavsumo.model.checksums import checksum, readable_checksum
 from cavsumo.model.scenario import BatchPlan, Scenario
 from cavsumo.results.inputs import inputs_folder, unpacked
+from cavsumo.suites.cases import suite_inputs
 
 
 def input_files(plan: BatchPlan) -> dict[str, Path]:
@@ -31,7 +32,8 @@ def input_files(plan: BatchPlan) -> dict[str, Path]:
     policies = [file for file in map(policy_file, plan.cast.values()) if file is not None]
     named = [Path(value) for value in plan.params.values() if isinstance(value, str)]
     files = (*scenario.additional, *policies, *named)
-    return found | {str(file): scenario.present(file) for file in files}
+    found |= {str(file): scenario.present(file) for file in files}
+    return found if plan.suite is None else found | suite_inputs(plan)
 
 
 def present_paths(

@@ -57,6 +57,12 @@ def verdicts_of(row: Mapping[str, Any]) -> dict[str, str]:
     return {name: verdict for name, _, verdict in (word.rpartition("=") for word in said)}
 
 
+def parameters_of(row: Mapping[str, Any]) -> dict[str, str]:
+    """The parameters of a suite's case; empty outside of suites."""
+    said = str(row.get("parameters") or "").split()
+    return {name: value for name, _, value in (word.partition("=") for word in said)}
+
+
 def is_test(row: Mapping[str, Any]) -> bool:
     """Whether the precondition was triggered: a test in the seed's sense."""
     return row["outcome"] in (HELD, VIOLATED)

@@ -11,6 +11,8 @@ from cavsumo.agents.base import Agent
 from cavsumo.errors import InputError
 from cavsumo.model.bodies import Kind
 from cavsumo.model.carriageway import Start, StartRecord
+from cavsumo.model.geometry import wrap
+from cavsumo.model.scenario.script import Programme
 from cavsumo.model.snapshot import BodyState, Snapshot
 from cavsumo.network.recorded_starts import recorded_start
 from cavsumo.simulation.setup import Setup
@@ -48,6 +50,9 @@ def placed(
     if waited:
         reset(_states(setup, waited), waited)
         return Placed(starts, waited, setup.world.shift(tuple(_states(setup, starts))))
+    script = setup.scenario.script
+    if script is not None and not starts:
+        starts = tuple(map(_scripted, script.testers))
     if starts:
         return Placed(starts, (), reset(_states(setup, starts), starts))
     kinds = [body.kind for body in setup.bodies]
@@ -68,6 +73,12 @@ def _cleared(setup: Setup, drawn: Starts, snapshot: Snapshot, rng: np.random.Gen
     taken = [snapshot.ego.box, *(BodyState(*raw).box for raw in setup.world.everybody())]
     starts = setup.site.cleared(kinds, drawn, taken, rng)
     return Placed(starts, drawn, setup.world.shift(tuple(_states(setup, starts))))
+
+
+def _scripted(programme: Programme) -> Start:
+    """Where a programmed body starts."""
+    way = programme.way
+    return Start(way.x_m, way.y_m, wrap(way.heading_rad), v=programme.speed_mps)
 
 
 def _told(setup: Setup, records: Sequence[Sequence[StartRecord]]) -> Starts:

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from cavsumo.agents.casting import teams, tester_bodies
 from cavsumo.assertions.base import Assertion
 from cavsumo.assertions.specs import assertions_of
-from cavsumo.egos import make_ego
 from cavsumo.egos.base import Ego, Mission
+from cavsumo.egos.specs import ego_of
 from cavsumo.model.bodies import Body
 from cavsumo.model.scenario import Scenario
 from cavsumo.network.site import Site
@@ -38,6 +38,7 @@ class Setup:
     def mission(self) -> Mission:
         """The data that the ego has before its first episode."""
         site, route, dt = self.site, self.site.route, self.world.dt
+        script = self.scenario.script
         return Mission(
             site.net,
             route.edges,
@@ -47,6 +48,7 @@ class Setup:
             self.scenario.end,
             crossings=site.marked,
             surroundings=site.surroundings,
+            approach_speed=None if script is None else script.ego.speed_mps,
         )
 
     def close(self) -> None:
@@ -57,7 +59,7 @@ class Setup:
 
 def make_setup(scenario: Scenario, site: Site, ego: Ego | None = None) -> Setup:
     """The setup of a scenario, with an ego of its own unless one is given."""
-    ego = ego or make_ego(scenario.ego, scenario.ego_params)
+    ego = ego or ego_of(scenario)
     return Setup(
         scenario=scenario,
         world=World(scenario, site, ego),

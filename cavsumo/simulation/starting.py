@@ -44,7 +44,7 @@ def started(
     begun = placed(setup, agents, placing, reset)
     ego = setup.world.ego_body
     scene = setup.site.scene(setup.world.dt, ego, setup.bodies, begun.starts, seed)
-    scene = dataclasses.replace(scene, horizon=scenario.end)
+    scene = dataclasses.replace(scene, horizon=scenario.end, script=scenario.script)
     senses = _senses(setup, scene, generators[1 + len(agents) :])
     cast(setup, agents, scene, generators)
     setup.ego.reset(scene)

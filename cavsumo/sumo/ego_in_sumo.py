@@ -12,6 +12,7 @@ from cavsumo.model.bodies import Body
 from cavsumo.model.kinematics import steering_for_turn, step_floats, wrap
 from cavsumo.model.snapshot import BodyState
 from cavsumo.sumo.calls import direct
+from cavsumo.sumo.guided import GuidedEgo
 from cavsumo.sumo.moved_bodies import EGO, UNSAFE, MovedBodies
 from cavsumo.sumo.poses import from_sumo
 
@@ -23,6 +24,7 @@ class EgoInSumo:
         body: its id and its box.
         moved: by which an ego that steers itself is moved.
         dt: length of a timestep [s].
+        guided: the ego of a scripted test; None for others.
 
     Attributes:
         state: its state now; set with ``found`` before the first command.
@@ -31,8 +33,10 @@ class EgoInSumo:
 
     state: BodyState
 
-    def __init__(self, body: Body, moved: MovedBodies, dt: float) -> None:
-        self._body, self._moved, self._dt = body, moved, dt
+    def __init__(
+        self, body: Body, moved: MovedBodies, dt: float, guided: GuidedEgo | None = None
+    ) -> None:
+        self._body, self._moved, self._dt, self._guided = body, moved, dt, guided
         self._driven: BodyState | None = None
         self._commanded = False
         self.steering = 0.0
@@ -47,6 +51,8 @@ class EgoInSumo:
         Raises EgoError for one that steers no longer itself.
         """
         if command is None:
+            if self._guided is not None:
+                self._guided.release()
             return
         if not self._commanded:  # its first command may come late, when another driver takes over
             self._commanded = True
@@ -82,6 +88,8 @@ class EgoInSumo:
         """The ego as SUMO moves it; None before it entered and after it left."""
         if EGO not in vehicles:
             return None
+        if self._guided is not None:
+            return self._guided.state()
         x, y = self._position(EGO)
         x, y, o = from_sumo(x, y, self._angle(EGO), self._body.kind.length)
         return BodyState(self._body, x, y, self._speed(EGO), o)

@@ -14,10 +14,12 @@ from cavsumo.egos.base import Ego
 from cavsumo.model.bodies import PEDESTRIAN
 from cavsumo.model.carriageway import Start
 from cavsumo.model.geometry import Box, gap
+from cavsumo.model.scenario import Scenario
 from cavsumo.model.snapshot import BodyState
 from cavsumo.network.site import Site
 from cavsumo.sumo.calls import direct
 from cavsumo.sumo.poses import from_sumo, front
+from cavsumo.sumo.vehicle_types import type_of
 
 EGO = "ego"
 KEEP_EXACT = 2  # moveToXY: exactly there, on the network or off it
@@ -30,14 +32,11 @@ UNSAFE = 0  # setSpeedMode: none of SUMO's checks changes the commanded speed
 
 
 class MovedBodies:
-    """The moved bodies of one episode.
+    """The moved bodies of one episode."""
 
-    Args:
-        persons: whether pedestrians are persons in SUMO.
-    """
-
-    def __init__(self, site: Site, ego: Ego, *, persons: bool) -> None:
-        self._site, self._ego, self._persons = site, ego, persons
+    def __init__(self, scenario: Scenario, site: Site, ego: Ego) -> None:
+        self._scenario, self._site, self._ego = scenario, site, ego
+        self._persons = scenario.embodiment == "person"
         # Of each body the state that SUMO was told, and the arguments with which it was.
         self._told: dict[str, tuple[BodyState, tuple[float, float, float]]] = {}
         self._move = direct(libsumo.vehicle, "moveToXY")
@@ -46,7 +45,8 @@ class MovedBodies:
     def insert(self, states: Sequence[BodyState], starts: Sequence[Start]) -> None:
         """Add the ego and the testers, each at its place before the first timestep."""
         route = self._site.route
-        speed = self._ego.depart_speed
+        # That of a script enters standing, which SUMO always allows, and then has its speed.
+        speed = self._ego.depart_speed if self._scenario.script is None else 0.0
         libsumo.vehicle.add(
             EGO,
             "cavsumo_ego",
@@ -62,8 +62,8 @@ class MovedBodies:
                 libsumo.person.add(state.id, edges[0], 0.0, typeID="cavsumo_person")
                 libsumo.person.appendWalkingStage(state.id, list(edges), 0.0)
             else:
-                kind = state.body.kind.name
-                libsumo.vehicle.add(state.id, _route_of(start), typeID=f"cavsumo_{kind}")
+                name = type_of(self._scenario, state.body)
+                libsumo.vehicle.add(state.id, _route_of(start), typeID=name)
         self.place(states)
 
     def entered(self, states: Sequence[BodyState]) -> None:

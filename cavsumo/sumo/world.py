@@ -32,6 +32,7 @@ from cavsumo.sumo.calls import direct
 from cavsumo.sumo.connection import Simulations
 from cavsumo.sumo.departure_notes import DepartureNotes
 from cavsumo.sumo.ego_in_sumo import EgoInSumo
+from cavsumo.sumo.guided import GuidedEgo
 from cavsumo.sumo.light_letters import LightLetters
 from cavsumo.sumo.moved_bodies import EGO, MovedBodies, make_room
 from cavsumo.sumo.reseeding import reseed
@@ -132,8 +133,10 @@ class World:
         """Begin an episode, see ``reset``."""
         self.collisions: set[tuple[str, str]] = set()
         self.teleports = self.emergency_stops = 0
-        self._moved = MovedBodies(self.site, self.ego, persons=self._persons)
-        self._ego = EgoInSumo(self.ego_body, self._moved, self.dt)
+        script = self.scenario.script
+        guided = None if script is None else GuidedEgo(libsumo, script, self.ego_body)
+        self._moved = MovedBodies(self.scenario, self.site, self.ego)
+        self._ego = EgoInSumo(self.ego_body, self._moved, self.dt, guided)
         self._step = 0
         self._vehicles: tuple[str, ...] = ()
         self._departures: DepartureNotes | None = None
@@ -145,7 +148,7 @@ class World:
             if note:
                 self._departures = self._notes(demand, states)
             self._moved.insert(states, starts)
-            self._enter(states)
+            self._enter(states, guided)
             self._vehicles = tuple(make_room(self._vehicles, states, starts))
         self._states = tuple(states)
         self._everything = everything
@@ -268,7 +271,7 @@ class World:
                 os.dup2(stderr, 2)
                 os.close(stderr)
 
-    def _enter(self, states: Sequence[BodyState]) -> None:
+    def _enter(self, states: Sequence[BodyState], guided: GuidedEgo | None) -> None:
         """Step until the ego has entered; the testers wait meanwhile."""
         for waited in range(max(2, round(ENTRY_S / self.dt))):
             self._advance()
@@ -277,12 +280,19 @@ class World:
                 if waited * self.dt > PROMPT_S:
                     self.simulations.set_light()  # the light went on while the ego waited
                 self._moved.entered(states)
-                self._ego.state = ego
+                self._ego.state = ego if guided is None else self._approach(guided, states)
                 return
             self._moved.place(states)
         raise SimulationError(
             f"the ego found no room to enter edge {self.site.route.edges[0]!r} in {ENTRY_S:g} s"
         )
+
+    def _approach(self, ego: GuidedEgo, states: Sequence[BodyState]) -> BodyState:
+        """Give the ego of a script its speed."""
+        ego.enter()
+        self._moved.place(states)
+        self._advance()
+        return ego.begin()
 
     # Reading from SUMO
 

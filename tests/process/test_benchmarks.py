@@ -73,6 +73,22 @@ def test_every_benchmark_is_played_here() -> None:
     assert scripts == set(re.findall(r'play\(\s*"(\w+)"', here))
 
 
+def test_reference_tracks(play: Play) -> None:
+    """One cell: the largest differences are within the tolerances."""
+    test, everything = play("reference_tracks", "--only", "CPFA/60/50").splitlines()[1:]
+    assert (test.split()[:2], everything.split()[0]) == (["CPFA", "1"], "all")
+    place, speed, impact = numbers(everything)[1:]
+    assert place < 0.05
+    assert speed < 0.05
+    assert impact < 0.02
+
+
+def test_un_r157(play: Play) -> None:
+    """The grid of decelerations, without a collision, as published."""
+    (line,) = play("un_r157", "--test", "deceleration").splitlines()[1:]
+    assert line.split() == ["deceleration", "1,121", "0", "0"]
+
+
 def test_avoidable(play: Play) -> None:
     """One ego, one agent, both reference drivers."""
     said = play("avoidable", "--runs", "1", "-j", "1", EGOS=("constant",), AGENTS=("random",))

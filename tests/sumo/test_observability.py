@@ -132,7 +132,7 @@ def test_everybody_is_shown_views_and_the_rest_the_truth(
         setup.close()
 
 
-@pytest.mark.parametrize("agent", sorted(set(AGENTS) - {"noop"}))
+@pytest.mark.parametrize("agent", sorted(set(AGENTS) - {"noop", "scripted"}))
 def test_every_walker_copes_with_bad_eyes(staged: Staged, agent: str) -> None:
     """No agent that comes with cavsumo trips over what a sensor shows it.
 

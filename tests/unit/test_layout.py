@@ -21,20 +21,22 @@ ROOMS = {
     for room, uses in {
         "model": "",
         "games": "model",
+        "suites": "model",
         "network": "model",
         "agents": "model games",
         "assertions": "model network agents",
         "egos": "model agents assertions",
         "sumo": "model network egos",
         "simulation": "model network agents assertions egos sumo",
-        "results": "model network agents assertions egos sumo simulation",
-        "batch": "model network agents assertions egos sumo simulation results",
-        "report": "model network assertions egos results batch",
+        "results": "model suites network agents assertions egos sumo simulation",
+        "batch": "model suites network agents assertions egos sumo simulation results",
+        "report": "model suites network assertions egos results batch",
         "interop": "model network sumo results",
-        "api": "model network batch report results",
+        "api": "model suites network batch report results",
         "envs": "model network agents assertions egos simulation results batch",
         "testing": "model network agents assertions egos",
-        "cli": "model games network agents assertions egos results batch report interop testing",
+        "cli": "model games suites network agents assertions egos results batch report interop "
+        "testing",
     }.items()
 }
 ROOT = {"__init__", "__main__", "errors"}

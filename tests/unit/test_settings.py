@@ -22,8 +22,9 @@ from cavsumo.model.scenario.option import Option
 from cavsumo.model.scenario.sensor import Sensor
 
 PAGE = (Path(__file__).resolve().parents[2] / "docs" / "settings.md").read_text(encoding="utf-8")
-# Fields that no user sets: the scenario is a record of its own, and what agents know is learned.
-INNER = {"scenario", "known"}
+# Fields that are no settings: the scenario, scripts and suites are records of their own, and what
+# agents know is learned.
+INNER = {"scenario", "known", "script", "suite"}
 FIELDS = sorted({*Scenario.model_fields, *BatchPlan.model_fields} - INNER)
 BY_KEY = {setting.key: setting for setting in settings()}
 

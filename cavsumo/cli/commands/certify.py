@@ -87,6 +87,11 @@ def _ready(order: CertifyOptions, output: Path, steps: SlowSteps) -> _Ready:
     """Check and prepare everything."""
     steps.begin(f"reading {order.results}")
     plan, manifest = recorded_plan(order.results)
+    if plan.suite is not None or plan.scenario.script is not None:
+        raise InputError(
+            f"certify: {str(order.results)!r} holds scripted tests, which are the same for every "
+            "seed; play the suite with other egos, or with --vary N"
+        )
     egos = opponents(order.egos, order.ego_param, plan.scenario)
     check_trust(plan.scenario, order.results, _allowed(order), ego=not order.egos)
     seeds = used([order.results, *order.apart], order.param)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -14,6 +14,7 @@ from cavsumo.batch.manner import Means
 from cavsumo.batch.planned import PlannedBatch, planned
 from cavsumo.batch.playing import played
 from cavsumo.batch.preflight import CheckedBatch, prepared_batches
+from cavsumo.batch.sentences import many
 from cavsumo.batch.summary import summarise
 from cavsumo.batch.tally import found_by
 from cavsumo.cli.steps import SlowSteps
@@ -27,8 +28,16 @@ def run(settings: Mapping[str, Any], output: Path, means: Means, manner: Manner)
     return run_study(planned([Part("", dict(settings))], output, manner), means, manner)
 
 
-def run_study(batches: Sequence[PlannedBatch], means: Means, manner: Manner) -> int:
-    """Play one batch after another; all are checked before anything is written."""
+def run_study(
+    batches: Sequence[PlannedBatch],
+    means: Means,
+    manner: Manner,
+    head: Callable[[Sequence[Ended]], str] = lambda ended: "",
+) -> int:
+    """Play one batch after another; all are checked before anything is written.
+
+    ``head``: makes the table of the summary, in place of that of the agents.
+    """
     with SlowSteps(quiet=manner.quiet) as steps:
         steps.begin("reading the network and looking for starts")
         checked = prepared_batches(batches, manner)
@@ -38,7 +47,7 @@ def run_study(batches: Sequence[PlannedBatch], means: Means, manner: Manner) -> 
     ended, interrupted = played(checked, means, manner, announce)
     status = exit_status(ended, interrupted, manner.exit_zero)
     if not manner.quiet:
-        summarise(ended)
+        summarise(ended, head(ended))
         if status == Exit.VIOLATED:
             print(f"cavsumo: exit status {status:d}: {_reason(ended)}", file=sys.stderr)
     return status
@@ -93,6 +102,11 @@ def _first_line(batch: CheckedBatch, jobs: int) -> str:
     bodies = "buses" if scenario.kind == "bus" else f"{scenario.kind}s"
     at_a_time = f", {jobs} at a time" if jobs > 1 else ""
     part = f"{batch.name}: " if batch.name else ""
+    if plan.suite is not None:
+        return (
+            f"cavsumo: suite {plan.suite.name}, ego {driver}, seed {plan.seed}, "
+            f"{many(plan.runs, 'case')}{shard}{at_a_time}"
+        )
     return (
         f"cavsumo: {part}agent {' '.join(plan.agents)}, {scenario.testers} {bodies}, "
         f"ego {driver}, network {scenario.name}{where}, traffic {routes}, "

@@ -43,6 +43,7 @@ LIGHTS = {
 
 def hello(mission: Mission, kind: Kind) -> bytes:
     """The first line: the constants of the scenario."""
+    speed = mission.approach_speed
     return _line(
         {
             "type": "hello",
@@ -50,6 +51,7 @@ def hello(mission: Mission, kind: Kind) -> bytes:
             "version": VERSION,
             "timestep_s": mission.dt,
             "horizon_s": mission.horizon,
+            **({} if speed is None else {"approach_speed_mps": speed}),
             "ego": {
                 "length_m": kind.length,
                 "width_m": kind.width,

@@ -20,6 +20,7 @@ from cavsumo.model.sumo_configuration import with_configuration
 from cavsumo.model.visible_files import is_visible
 
 SCENARIO_KEYS = frozenset(Scenario.model_fields)
+SCRIPTED = "scripted"  # the agent that plays scripts, and nothing else
 PLAN_KEYS = frozenset(BatchPlan.model_fields) - {"scenario"}
 SENSOR_KEYS = ("ego_sensor", "tester_sensor")
 
@@ -49,6 +50,9 @@ def plan_from(
     if str(scenario.get("traffic")) == "none":
         del scenario["traffic"]
     scenario["routes"] = _route_file(scenario, places, source)
+    scripted = settings.get("script") or settings.get("suite")
+    if scripted and not settings.get("agents"):
+        settings = {**settings, "agents": (SCRIPTED,)}
     try:
         plan = BatchPlan(
             scenario=Scenario(**scenario).placed(places),
@@ -72,6 +76,12 @@ def _check_together(plan: BatchPlan, source: str) -> None:
         raise InputError(
             f"{source}: a shard sees its own rows only; first, until_tests and until_half_width "
             "need the whole batch"
+        )
+    scripted = plan.scenario.script is not None or plan.suite is not None
+    if scripted != (SCRIPTED in plan.cast.values()) or (scripted and len(plan.cast) > 1):
+        raise InputError(
+            f"{source}: agent {SCRIPTED} plays scripts and suites, and no other agent does; got "
+            f"{' '.join(plan.agents)}"
         )
     check_teams(plan.scenario, source)
 

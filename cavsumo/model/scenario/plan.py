@@ -14,6 +14,7 @@ from cavsumo.model.scenario.option import Option
 from cavsumo.model.scenario.params import Params, qualified
 from cavsumo.model.scenario.record import Scenario
 from cavsumo.model.scenario.sensor import Finite
+from cavsumo.model.scenario.suite import SuiteChoice
 
 NO_REFERENCE = "none"  # in place of a reference driver's name: violations are not judged
 
@@ -47,6 +48,9 @@ class BatchPlan(BaseModel):
         None,
         description="what agents know at the beginning of every episode, by label: then nobody "
         "learns from one episode for the next",
+    )
+    suite: SuiteChoice | None = Field(
+        None, description="the suite whose cases are played, one a run, in place of one scenario"
     )
     runs: Annotated[int, Option("batch", metavar="N")] = Field(
         100, ge=1, le=10_000_000, description="episodes an agent"

@@ -17,6 +17,7 @@ from cavsumo.model.checks import densities
 from cavsumo.model.named_networks import DEFAULT, network_file, routes_file
 from cavsumo.model.scenario.option import Option
 from cavsumo.model.scenario.params import Params, qualified
+from cavsumo.model.scenario.script import ScriptedTest
 from cavsumo.model.scenario.sensor import Finite, Sensor
 from cavsumo.model.vocabulary import ApproachType, Signal
 
@@ -153,6 +154,21 @@ class Scenario(BaseModel):
     sumo_width: Annotated[Finite, Option("testers", metavar="M")] = Field(
         0.05, ge=0.01, le=5, description="width that SUMO is shown of a tester pedestrian [m]"
     )
+    script: ScriptedTest | None = Field(
+        None, description="programmed testers in place of others, and the ego's approach"
+    )
+
+    @model_validator(mode="before")
+    @classmethod
+    def _one_scripted_team(cls, given: Any) -> Any:
+        """The testers of a script are its own, and one agent moves them all."""
+        script = given.get("script") if isinstance(given, Mapping) else None
+        testers = script.get("testers") if isinstance(script, Mapping) else None
+        if isinstance(script, ScriptedTest):
+            testers = script.testers
+        if not isinstance(testers, list | tuple):
+            return given
+        return {**given, "testers": len(testers), "bodies_per_agent": len(testers)}
 
     @model_validator(mode="before")
     @classmethod

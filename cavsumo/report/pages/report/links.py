@@ -177,7 +177,7 @@ def _write_page(
     """Write the page of a run."""
     assert scene.plan is not None
     assert scene.site is not None
-    plan = batch.plan.model_copy(update={"scenario": scene.plan.scenario})
+    plan = batch.plan.model_copy(update={"scenario": scene.plan.scenario, "suite": None})
     trace = read_trace(inside(batch.csv_file, row["trace"]))
     record = Record(plan, row, trace, batch.manifest, batch.csv_file)
     write_page(record, trace, scene.site, folder / look.page)

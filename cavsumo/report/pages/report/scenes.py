@@ -8,13 +8,14 @@ from dataclasses import dataclass, field, replace
 from cavsumo.batch.located import located
 from cavsumo.batch.replay import Record
 from cavsumo.batch.shown import is_ours, shown_site
-from cavsumo.errors import CavsumoError
+from cavsumo.errors import CavsumoError, InputError
 from cavsumo.model.scenario import BatchPlan
 from cavsumo.network.site import Site
 from cavsumo.report.grouping import by_content
 from cavsumo.report.load import Batch
 from cavsumo.results.reading import inside, whole_lines
 from cavsumo.results.traces import Trace, read_trace
+from cavsumo.suites.cases import case_plan, cases_of
 
 
 @dataclass(frozen=True)
@@ -56,16 +57,27 @@ def _scene(batch: Batch) -> BatchPlace:
     """The place of a batch: the same files, identified by their checksums."""
     name = batch.plan.scenario.name
     try:
-        record = Record(batch.plan, {}, None, batch.manifest, batch.csv_file)
+        plan = _one_place(batch.plan)
+        record = Record(plan, {}, None, batch.manifest, batch.csv_file)
         plan = located(record, shown=True).plan
         return BatchPlace(name, plan, shown_site(plan, _some_trace(batch)), "")
     except CavsumoError as error:
         return BatchPlace(name, None, None, str(error))
 
 
+def _one_place(plan: BatchPlan) -> BatchPlan:
+    """The plan of one place; raises InputError for a suite that is played on several networks."""
+    if plan.suite is not None and len(nets := cases_of(plan).nets()) > 1:
+        raise InputError(
+            f"the suite is played on {' and '.join(nets)}; cavsumo replay shows one case"
+        )
+    return case_plan(plan, 0)
+
+
 def _some_trace(batch: Batch) -> Trace | None:
     """A trace with the box of an external ego; None for built-in egos, or without traces."""
-    if is_ours(batch.plan.scenario):
+    scenario = case_plan(batch.plan, 0).scenario
+    if scenario.script is not None or is_ours(scenario):
         return None
     for _, row in whole_lines(batch.csv_file):
         if row is not None and row["trace"]:

@@ -1,0 +1,159 @@
+"""Programmed testers that follow a script: each along its way, and each commits once.
+
+The place of a body is a function of time (``model.motion``). The kinematics moves a body by its old
+speed, so the speed for a timestep is the mean over the timestep after it::
+
+    v(t + dt) = (s(t + 2 dt) - s(t + dt)) / dt
+
+and the body is at s(t) exactly at every timestep. Before its programme begins it stands or keeps
+its speed. When it has to begin is computed from the ego's place and speed until that moment; then
+it is fixed.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from cavsumo.agents.base import AGENTS, Agent
+from cavsumo.errors import AgentError, EgoError
+from cavsumo.model.bodies import Action
+from cavsumo.model.curve import PlaneCurve
+from cavsumo.model.kinematics import wrap
+from cavsumo.model.motion import Motion
+from cavsumo.model.scenario.script import Begins, Programme, ScriptedTest
+from cavsumo.model.scene import Scene
+from cavsumo.model.snapshot import BodyState, Snapshot
+
+HOLDS_S = 0.5  # an ego that keeps the speed with which it entered for so long holds it
+LATE_S = 0.1  # a body that cannot begin in time by more than that would miss its point
+ROUNDS = 4  # of Newton's method for a steering angle; it converges in two or three
+
+
+@AGENTS.register("scripted")
+class ScriptedAgent(Agent):
+    """Moves the programmed testers of a suite or a script; without one it does nothing."""
+
+    sees_background = False
+
+    def reset(self, scene: Scene, owned: Sequence[int], rng: np.random.Generator) -> None:
+        super().reset(scene, owned, rng)
+        self._script, self._checked = scene.script, False
+        if scene.script is not None:
+            testers, begins = scene.script.testers, scene.script.commitments
+            self._followers = [Follower(testers[i], begins[i], scene.dt) for i in owned]
+
+    def choose_action(self, snapshot: Snapshot) -> tuple[Action, ...]:
+        if self._script is None:
+            return super().choose_action(snapshot)
+        front, v = front_of_ego(self._script, self.scene, snapshot), snapshot.ego.v
+        if not self._checked and snapshot.time >= HOLDS_S - 1e-9:
+            self._checked = True
+            check_approach(self._script, v)
+        return tuple(
+            follower.action(snapshot.testers[i], snapshot.time, front, v)
+            for i, follower in zip(self.owned, self._followers, strict=True)
+        )
+
+
+def check_approach(script: ScriptedTest, v: float) -> None:
+    """Raise EgoError unless an ego that has just entered keeps the speed of the test [m/s]."""
+    wanted, name = script.ego.speed_mps, script.name or "the script"
+    if abs(v - wanted) > script.ego.tolerance_mps:
+        raise EgoError(
+            f"the ego drives {v * 3.6:.1f} km/h {HOLDS_S:g} s after it entered with the speed of "
+            f"{name}, {wanted * 3.6:.1f} km/h: it does not hold it, and nothing was tested"
+        )
+
+
+def front_of_ego(script: ScriptedTest, scene: Scene, snapshot: Snapshot) -> float:
+    """Arc length of the ego's front on its way, as scripts count it [m]."""
+    approach, ego = script.ego, snapshot.ego
+    half = ego.body.kind.length / 2
+    axle = approach.axle(ego.body.kind.length)
+    back = axle - half  # of the point that follows the way, from the centre
+    here = scene.ego_path.project(ego.x - back * math.cos(ego.o), ego.y - back * math.sin(ego.o))
+    return approach.start_m - half + here.along + axle
+
+
+@dataclass
+class Follower:
+    """One body in one episode.
+
+    Attributes:
+        programme: what it does.
+        begins: when its stages begin; None for never.
+        dt: length of a timestep [s].
+        begun: when its programme began [s]; infinite before.
+        ahead: distance on its way at that moment [m].
+    """
+
+    programme: Programme
+    begins: Begins | None
+    dt: float
+    begun: float = math.inf
+    ahead: float = 0.0
+    curve: PlaneCurve = field(init=False)
+    motion: Motion = field(init=False)
+
+    def __post_init__(self) -> None:
+        self.curve, self.motion = self.programme.way.curve, self.programme.motion
+
+    def along(self, time: float) -> float:
+        """Distance on its way at a time [m]."""
+        if time <= self.begun:
+            return self.programme.speed_mps * time
+        return self.ahead + self.motion.at(time - self.begun)[0]
+
+    def action(self, state: BodyState, time: float, front: float, v: float) -> Action:
+        """The action of a timestep; ``front`` and ``v``: the ego's place and speed."""
+        begins, dt = self.begins, self.dt
+        if begins is not None and self.begun == math.inf:
+            self._commit(begins, time, front, v)
+        here, there = self.along(time + dt), self.along(time + 2 * dt)
+        throttle = ((there - here) / dt - state.v) / dt
+        steering = self._steering(state, here) if self.curve.legs and state.v > 0.0 else 0.0
+        return Action(throttle, steering)
+
+    def _commit(self, begins: Begins, time: float, front: float, v: float) -> None:
+        """Fix the beginning if it lies within the two timesteps that are decided now."""
+        moment = self._moment(begins, time, front, v)
+        if moment < time - LATE_S:
+            raise AgentError(
+                f"a programmed {self.programme.kind} had to begin {time - moment:.1f} s ago to "
+                "arrive with the ego; a script needs an earlier start_m"
+            )
+        if moment < time + 2 * self.dt:
+            self.begun = max(moment, time + self.dt)
+            self.ahead = self.programme.speed_mps * self.begun
+
+    def _moment(self, begins: Begins, time: float, front: float, v: float) -> float:
+        """When it has to begin, as far as is known now [s]."""
+        if begins.at_s is not None:
+            return begins.at_s
+        assert begins.ego_at_m is not None
+        left = begins.ego_at_m - front
+        arrives = time + (left / v if v > 0.0 else math.inf if left > 0.0 else 0.0)
+        if begins.own_at_m is None:
+            return arrives
+        return arrives - self.motion.when(begins.own_at_m - self.programme.speed_mps * time)
+
+    def _steering(self, state: BodyState, along: float) -> float:
+        """The steering by which the body is on its way after this timestep.
+
+        The kinematics moves it in the direction o + beta + theta / 2; Newton's method on that.
+        """
+        x, y, _ = self.curve.at(along)
+        kind, v = state.body.kind, state.v
+        turn = wrap(math.atan2(y - state.y, x - state.x) - state.o)
+        e, gain = 0.0, v * self.dt / kind.wheelbase
+        for _ in range(ROUNDS):
+            beta = math.atan(0.5 * math.tan(e))
+            slope = 0.5 * (1.0 + math.tan(e) ** 2) / (1.0 + 0.25 * math.tan(e) ** 2)
+            wrong = beta + gain * math.sin(beta) - turn
+            e -= wrong / (slope * (1.0 + gain * math.cos(beta)))
+            e = min(kind.steering_max, max(-kind.steering_max, e))
+        return e
