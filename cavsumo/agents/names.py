@@ -21,6 +21,7 @@ AGENT_NAMES = Names(
         "q-learning": "qlearning",
         "random": "random",
         "recorded": "recorded",
+        "search": "searched",
         "timing": "programmed",
     },
 )

@@ -101,7 +101,9 @@ class BatchRun:
         change.
         """
         todo, relearning = _to_retry(
-            self.recorder.csv_file, self.prepared.plan, self._knowledge.names
+            self.recorder.csv_file,
+            self.prepared.plan,
+            self._knowledge.names | self.prepared.cast.searchers,
         )
         known = self._knowledge.known()
         self._knowledge.forget(relearning)
@@ -144,6 +146,7 @@ class BatchRun:
             self.executor,
             todo,
             memories=self._knowledge.memories,
+            searches=self._knowledge.searches,
             ahead=LOOK_AHEAD * self.jobs,
             stopped=self.stopped,
         )

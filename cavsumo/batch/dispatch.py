@@ -25,6 +25,7 @@ from typing import Any
 from cavsumo.batch.jobs import Job, Memory, failed, job
 from cavsumo.batch.messages import Answer
 from cavsumo.batch.prepared import PreparedBatch
+from cavsumo.batch.searching import Searching
 from cavsumo.batch.worker import play
 from cavsumo.errors import BatchError, CavsumoError
 
@@ -37,6 +38,7 @@ def run_batch(
     todo: Iterable[int],
     *,
     memories: Mapping[str, Memory] | None = None,
+    searches: Mapping[str, Searching] | None = None,
     ahead: int = 16,
     stopped: Callable[[], bool] = lambda: False,
 ) -> Iterator[Answer]:
@@ -48,11 +50,12 @@ def run_batch(
         executor: plays jobs by ``cavsumo.batch.worker.play``, in threads or in processes anywhere.
         todo: numbers of episodes, ascending.
         memories: the knowledge of learning agents, by name.
+        searches: the searches of searching agents, likewise; they are told of every episode.
         ahead: number of episodes that run or wait for their turn.
         stopped: called all the time; once true, running episodes are finished and no more are
             begun.
     """
-    line = _Line(prepared, executor, todo, dict(memories or {}))
+    line = _Line(prepared, executor, todo, dict(memories or {}), searches or {})
     try:
         while True:
             if stopped():
@@ -89,8 +92,10 @@ class _Line:
         executor: Executor,
         todo: Iterable[int],
         memories: dict[str, Any],
+        searches: Mapping[str, Searching],
     ) -> None:
         self.prepared, self.executor, self.memories = prepared, executor, memories
+        self.searches = searches
         self._coming = self._grouped(todo)
         self.entries: deque[_Entry] = deque()
         self._learners = prepared.cast.learners
@@ -105,7 +110,7 @@ class _Line:
                 if entry.agent in learning:
                     continue  # it can start when it has the memory of the episode before
                 learning.add(entry.agent)
-            if entry.future is None:
+            if entry.future is None and self._known(entry):
                 self._submit(entry)
 
     def advance(self) -> None:
@@ -117,6 +122,8 @@ class _Line:
                 entry.answers = self._answers(entry, entry.future)
                 if entry.agent in self._learners:
                     self.memories[entry.agent] = entry.answers[-1].memory
+                if entry.agent in self.searches:
+                    self.searches[entry.agent].told(entry.answers[-1].outcome.row)
 
     def ready(self) -> Iterator[Answer]:
         """The entries to return: all that are finished before the first that is not."""
@@ -142,10 +149,16 @@ class _Line:
             wanted = tuple(group)
             yield _Entry(wanted, agents[wanted[0] % len(agents)])
 
+    def _known(self, entry: _Entry) -> bool:
+        """Whether it is known what an entry is to play, for an agent that searches."""
+        search = self.searches.get(entry.agent)
+        return search is None or search.ready(entry.wanted[-1])
+
     def _jobs(self, entry: _Entry) -> list[Job]:
         """The jobs of an entry, from the beginning of the simulation that they share."""
         plan, last = self.prepared.plan, entry.wanted[-1]
-        memory = self.memories.get(entry.agent)
+        search = self.searches.get(entry.agent)
+        memory = search.memory(last) if search else self.memories.get(entry.agent)
         return [job(plan, run, memory) for run in range(last - last % plan.block, last + 1)]
 
     def _submit(self, entry: _Entry) -> None:

@@ -52,12 +52,14 @@ class Avoidability:
         last_chance: time of the latest perception with which it still would [s]; None if never.
         margin: how long before the violation that is [s].
         note: what kept it from being judged, or what to doubt, as a sentence.
+        perceived: when it perceived the risk [s]; None if not judged.
     """
 
     avoidable: bool | None
     last_chance: float | None = None
     margin: float | None = None
     note: str = ""
+    perceived: float | None = None
 
 
 class NotJudged(CavsumoError):
@@ -132,10 +134,11 @@ class AvoidabilityCheck:
                 f"{MOST_RERUNS} reruns leave open whether a perception up to "
                 f"{frames[high - 1].time:.1f} s would have been early enough"
             )
-        note = "; ".join(notes)
+        found = Avoidability(avoidable, note="; ".join(notes), perceived=frames[perceived].time)
         if low < 0:
-            return Avoidability(avoidable, note=note)
-        return Avoidability(avoidable, frames[low].time, frames[end].time - frames[low].time, note)
+            return found
+        last, margin = frames[low].time, frames[end].time - frames[low].time
+        return dataclasses.replace(found, last_chance=last, margin=margin)
 
     def avoidable(self, reference: Reference) -> bool:
         """Whether a reference driver would have avoided it, by one rerun at most.

@@ -43,8 +43,8 @@ Joint = Sequence[Sequence[Action]]
 class Episode:
     """The record of an episode, during and after it.
 
-    Frames and actions only where they are kept; ``drives``: whether the ego steers itself;
-    ``forecast``: what the testers said of it beforehand; ``starts``: where they started, and
+    ``seen``: all snapshots; frames and actions only where they are kept; ``drives``: whether the
+    ego steers itself; ``forecast``: what the testers said of it beforehand; ``starts``: where they started, and
     ``waited``: where they were while the ego entered; ``departures``: of the background, None
     where they were not recorded or do not tell all of it.
     """
@@ -68,6 +68,7 @@ class Episode:
     sumo_collisions: frozenset[tuple[str, str]] = frozenset()
     teleports: int = 0
     emergency_stops: int = 0
+    seen: list[Snapshot] = field(default_factory=list)
     frames: list[Snapshot] = field(default_factory=list)
     actions: list[Joint] = field(default_factory=list)
     starts: tuple[Start, ...] = ()
@@ -125,7 +126,7 @@ class EpisodeLoop:
         self._episode = Episode(Judgement(""), starts=begun.starts, waited=begun.waited)
         self._episode.forecast = _foretold(agents, self.agent_views)
         self._validity = ValidityMonitor(self.scene)
-        self.history: list[Snapshot] = []  # from which blame and progress are found
+        self.history: list[Snapshot] = self._episode.seen  # for blame, progress and grade
         self._chosen: list[Joint] = []
         self._keep(record or keep)
         self._arrived = False

@@ -1,0 +1,67 @@
+"""Manoeuvres that pedestrians are known for, as distributions over the space of tests.
+
+Whoever searches begins here: a blindly timed crossing, somebody slow, oblique, who hesitates, turns
+back, or walks along the lane and turns in. Every number that a manoeuvre leaves open is uniform.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from cavsumo.search.searchers import GENERATION, Told
+from cavsumo.search.space import NAMES, Point, Space
+
+Range = tuple[float, float]
+STRAIGHT: Range = (0.45, 0.55)
+THROUGH: Range = (0.98, 1.0)
+
+# For each manoeuvre the ranges of some numbers of ``space.NAMES``.
+MANOEUVRES: Mapping[str, Mapping[str, Range]] = {
+    "crosses": {"zone": (0.15, 0.6), "speed": (0.5, 1.0), "heading": STRAIGHT, "depth": THROUGH},
+    "crosses slowly": {"zone": (0.1, 0.7), "speed": (0.0, 0.35), "depth": THROUGH},
+    "comes towards": {"zone": (0.1, 0.8), "heading": (0.0, 0.3), "depth": THROUGH},
+    "walks away": {"zone": (0.1, 0.7), "heading": (0.7, 1.0), "depth": THROUGH},
+    "hesitates": {
+        "zone": (0.3, 1.0), "depth": (0.1, 0.5), "resume": (0.1, 0.5), "heading_2": STRAIGHT,
+        "heading_3": STRAIGHT, "length_2": (0.5, 1.0),
+    },
+    "waits on the road": {
+        "zone": (0.5, 1.0), "depth": (0.0, 0.4), "resume": (0.55, 1.0), "heading_2": (0.3, 0.7),
+        "heading_3": STRAIGHT,
+    },
+    "turns back": {
+        "zone": (0.1, 0.9), "depth": (0.5, 1.0), "resume": (0.0, 0.3), "heading_2": (0.8, 1.0),
+        "length_2": (0.3, 1.0), "heading_3": (0.9, 1.0),
+    },
+    "turns in": {
+        "zone": (0.3, 1.0), "depth": (0.1, 0.45), "resume": (0.0, 0.2), "heading_2": (0.6, 0.85),
+        "heading_3": (0.4, 0.6), "length_2": (0.1, 0.8),
+    },
+}  # fmt: skip
+
+
+@dataclass
+class ManoeuvreSearch:
+    """Each point one of ``MANOEUVRES`` for each body, in turn."""
+
+    space: Space
+    rng: np.random.Generator
+    turn: int = 0
+
+    def ask(self) -> list[Point]:
+        return [self._drawn() for _ in range(GENERATION)]
+
+    def tell(self, points: Sequence[Point], told: Sequence[Told]) -> None:
+        """Nothing is learned."""
+
+    def _drawn(self) -> Point:
+        point, named = self.rng.random(self.space.dimension), list(MANOEUVRES)
+        for i in range(self.space.bodies):
+            ranges = MANOEUVRES[named[(self.turn + i) % len(named)]]
+            for name, (low, high) in ranges.items():
+                point[i * len(NAMES) + NAMES.index(name)] = self.rng.uniform(low, high)
+        self.turn += 1
+        return point

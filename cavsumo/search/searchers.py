@@ -1,0 +1,54 @@
+"""The protocol of searchers, and the simple ones: random points, and neighbours of good ones."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import NamedTuple, Protocol
+
+import numpy as np
+
+from cavsumo.search.space import Point, Space
+
+GENERATION = 10  # points that are chosen together, before any of them is played
+
+
+class Told(NamedTuple):
+    """What came of a point.
+
+    Attributes:
+        grade: how near it came to a preventable failure (``results.grade``).
+        failed: whether it is a preventable failure.
+        kind: what makes two failures alike.
+    """
+
+    grade: float
+    failed: bool
+    kind: tuple[object, ...] = ()
+
+
+class Searcher(Protocol):
+    """Chooses the points of a generation from what came of those before."""
+
+    def ask(self) -> list[Point]:
+        """The points of the next generation."""
+
+    def tell(self, points: Sequence[Point], told: Sequence[Told]) -> None:
+        """What came of a generation; also of points that another searcher chose."""
+
+
+@dataclass
+class RandomSearch:
+    """Uniform over the space: the honest baseline."""
+
+    space: Space
+    rng: np.random.Generator
+
+    def ask(self) -> list[Point]:
+        return list(self.rng.random((GENERATION, self.space.dimension)))
+
+    def tell(self, points: Sequence[Point], told: Sequence[Told]) -> None:
+        """Nothing is learned."""
+
+
+Make = Callable[[Space, np.random.Generator], Searcher]
