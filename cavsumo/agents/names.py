@@ -26,6 +26,9 @@ AGENT_NAMES = Names(
     },
 )
 
+SEARCH = "search"  # the agent whose tests a searcher chooses, by one of these methods
+SEARCH_METHODS = ("portfolio", "random", "manoeuvres", "neighbours", "cma")
+
 PREFIX = "policy:"
 
 

@@ -37,7 +37,7 @@ class WalkProgramme(NamedTuple):
         depth: where the first leg ends: how far the body's front is in the ego's strip, negative
             before it [m].
         pause: how long it then stands [s].
-        resume: it stands on until the gap to the ego is in this zone; None to go on after the pause.
+        resume: it stands on until the gap to the ego is in this zone; None: after the pause.
         speed_2, heading_2, length_2: of the second leg [m/s, rad, m].
         heading_3: of the last one, with the speed of the second, until it has left the road [rad].
     """

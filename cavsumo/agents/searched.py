@@ -12,6 +12,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from cavsumo.agents.base import AGENTS, Agent
+from cavsumo.agents.names import SEARCH, SEARCH_METHODS
 from cavsumo.agents.programme import ProgrammedWalk, WalkProgramme
 from cavsumo.agents.recorded import start_of
 from cavsumo.model.bodies import Action
@@ -19,22 +20,20 @@ from cavsumo.model.checks import choice
 from cavsumo.model.scene import Scene
 from cavsumo.model.snapshot import Snapshot
 
-METHODS = ("portfolio", "random", "manoeuvres", "neighbours", "cma")
 
-
-@AGENTS.register("search")
+@AGENTS.register(SEARCH)
 class SearchAgent(Agent):
     """Searches for preventable failures: every episode is a point of a space of tests."""
 
     PARAMETERS: ClassVar[Mapping[str, str]] = {
-        "method": f"how points are chosen: {', '.join(METHODS)} (docs/search.md)",
+        "method": f"how points are chosen: {', '.join(SEARCH_METHODS)} (docs/search.md)",
     }
     sees_background = False
     drives = False
     searches = True
 
     def __init__(self, method: str = "portfolio") -> None:
-        self.method = choice("method", method, METHODS)
+        self.method = choice("method", method, SEARCH_METHODS)
         self._programmes: list[WalkProgramme | None] = []
 
     def reset(self, scene: Scene, owned: Sequence[int], rng: np.random.Generator) -> None:

@@ -13,6 +13,7 @@ from cavsumo.batch.learning import Knowledge
 from cavsumo.batch.messages import Answer
 from cavsumo.batch.prepared import OUTPUTS, PreparedBatch
 from cavsumo.batch.progress import Progress
+from cavsumo.batch.searching import SearchFacts
 from cavsumo.batch.stopping import stopping_rule
 from cavsumo.batch.tally import Tally
 from cavsumo.egos.ego_files import OutputWatch
@@ -122,6 +123,11 @@ class BatchRun:
         self.tally = Tally()
         for row in rows_of(self.recorder.csv_file):
             self.tally.add(row)
+
+    @property
+    def searches(self) -> dict[str, SearchFacts]:
+        """What the searching agents have found."""
+        return {label: search.facts() for label, search in self._knowledge.searches.items()}
 
     def end(self) -> None:
         """Complete the manifest."""

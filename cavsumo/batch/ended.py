@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 
+from cavsumo.batch.searching import SearchFacts
 from cavsumo.batch.tally import Tally
 
 
@@ -21,6 +22,7 @@ class Ended:
             hold however it was decided to stop.
         shared: episodes shared simulations, and those played in a fresh one are found tests.
         cut_short: somebody stopped it.
+        searches: by agent, what its search has found.
         promises: by agent, the class of egos for which its forecasts hold.
     """
 
@@ -32,6 +34,7 @@ class Ended:
     sequential: bool = False
     shared: bool = False
     cut_short: bool = False
+    searches: Mapping[str, SearchFacts] = field(default_factory=dict)
     promises: Mapping[str, str] = field(default_factory=dict)
 
     @property

@@ -91,6 +91,7 @@ def _play(
         sequential=looks_at_rows(prepared.plan),
         shared=prepared.plan.reset == "shared",
         cut_short=batch_run.cut_short or batch_run.status == "interrupted",
+        searches=batch_run.searches,
         promises={member.label: member.promise for member in prepared.cast},
     )
 

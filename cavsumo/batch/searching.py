@@ -7,8 +7,10 @@ by telling a new searcher the rows that are there.
 
 from __future__ import annotations
 
+import math
 import zlib
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -16,14 +18,39 @@ import numpy as np
 from cavsumo.agents.casting import teams
 from cavsumo.batch.jobs import Memory
 from cavsumo.batch.prepared import PreparedBatch
+from cavsumo.errors import ResultsError
 from cavsumo.model.bodies import kind_named
 from cavsumo.results.grade import INVALID_GRADE
 from cavsumo.results.rows import cell
 from cavsumo.search.methods import searcher_of
 from cavsumo.search.searchers import Told
 from cavsumo.search.space import Point, Space, space_of
+from cavsumo.search.words import in_common
 
 SPEED_BIN_MPS, PLACE_BIN_M = 2.0, 10.0  # failures within a bin are alike
+
+
+@dataclass(frozen=True)
+class SearchFacts:
+    """What a search has found.
+
+    Attributes:
+        episodes, seconds: how many points were played, and for how long in simulated time [s].
+        failures, distinct: preventable failures, and how many kinds of them.
+        first: after how many episodes, and simulated seconds, the first was found; None for none.
+        words: what the failures have in common.
+        uniform, covered: how many points were uniform over the space, and the share of its cells
+            (place, side, moment, speed) in which a point was played.
+    """
+
+    episodes: int
+    seconds: float
+    failures: int
+    distinct: int
+    first: tuple[int, float] | None
+    words: str
+    uniform: int
+    covered: float
 
 
 class Searching:
@@ -46,6 +73,8 @@ class Searching:
         self.points: list[Point] = []
         self._generation: list[int] = []  # episodes of the points that were asked for last
         self._told: dict[int, Told] = {}
+        self._lasted: dict[int, float] = {}
+        self._uniform: set[int] = set()
 
     def ready(self, run: int) -> bool:
         """Whether the point of an episode is known."""
@@ -64,7 +93,28 @@ class Searching:
         """Take up the row of an episode, in any order."""
         run = int(row["run"])
         if self.ready(run):
-            self._told[self._number(run)] = self._result(self.points[self._number(run)], row)
+            number = self._number(run)
+            self._told[number] = self._result(self.points[number], row)
+            self._lasted[number] = float(cell(row["time_s"]) or 0.0)
+
+    def facts(self) -> SearchFacts:
+        """What it has found so far."""
+        numbers = sorted(self._told)
+        failed = [n for n in numbers if self._told[n].failed]
+        first = None
+        if failed:
+            first = failed[0] + 1, math.fsum(self._lasted[n] for n in numbers if n <= failed[0])
+        played = [self.points[n] for n in numbers]
+        return SearchFacts(
+            episodes=len(numbers),
+            seconds=math.fsum(self._lasted.values()),
+            failures=len(failed),
+            distinct=len({self._told[n].kind for n in failed}),
+            first=first,
+            words=in_common([self.space.seen(self.points[n])[0] for n in failed]),
+            uniform=sum(n in self._uniform for n in numbers),
+            covered=self.space.covered(played),
+        )
 
     def _number(self, run: int) -> int:
         """The number of an episode among those of the agent."""
@@ -78,6 +128,8 @@ class Searching:
         asked = self._searcher.ask()
         self._generation = list(range(len(self.points), len(self.points) + len(asked)))
         self.points += asked
+        if self._searcher.uniform:
+            self._uniform.update(self._generation)
 
     def _result(self, point: Point, row: Mapping[str, Any]) -> Told:
         """What came of a point; a row of this session and one that was recorded tell the same."""
@@ -97,3 +149,19 @@ def space_of_batch(prepared: PreparedBatch) -> Space:
     """The space of the tests of a batch; raises InputError where it holds no start."""
     scenario = prepared.plan.scenario
     return space_of(prepared.site, kind_named(scenario.kind), teams(scenario))
+
+
+def searched(
+    prepared: PreparedBatch, label: str, rows: Iterable[Mapping[str, Any]], run: int
+) -> Memory:
+    """What the agents of a search had to know to play an episode, found from the rows before it.
+
+    Raises ResultsError where rows are missing.
+    """
+    search = Searching(prepared, label)
+    for row in rows:
+        if row["agent"] == label and int(row["run"]) < run:
+            search.told(row)
+    if not search.ready(run):
+        raise ResultsError(f"run {run} cannot be found again: rows of the search before it miss")
+    return search.memory(run)

@@ -18,9 +18,10 @@ PROGRESS = 0.02
 class EvolutionSearch:
     """Covariance matrix adaptation from a random point, again and again."""
 
-    def __init__(self, space: Space, rng: np.random.Generator, first: Sequence[Point] = ()) -> None:
+    uniform = False
+
+    def __init__(self, space: Space, rng: np.random.Generator) -> None:
         self.space, self.rng = space, rng
-        self._first = list(first)
         self._begin()
 
     def ask(self) -> list[Point]:
@@ -40,7 +41,7 @@ class EvolutionSearch:
         """Begin at another point."""
         import cma
 
-        x0 = self._first.pop(0) if self._first else self.rng.random(self.space.dimension)
+        x0 = self.rng.random(self.space.dimension)
         options: dict[str, Any] = {
             "bounds": [0.0, 1.0],
             "popsize": GENERATION,

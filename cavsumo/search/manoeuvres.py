@@ -50,6 +50,7 @@ class ManoeuvreSearch:
     space: Space
     rng: np.random.Generator
     turn: int = 0
+    uniform: bool = False
 
     def ask(self) -> list[Point]:
         return [self._drawn() for _ in range(GENERATION)]

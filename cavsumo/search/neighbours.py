@@ -24,6 +24,7 @@ class NeighbourSearch:
     rng: np.random.Generator
     first: Searcher
     best: list[tuple[float, Point]] = field(default_factory=list)
+    uniform: bool = False
 
     def ask(self) -> list[Point]:
         if not self.best:

@@ -34,6 +34,11 @@ class Portfolio:
         self._turn = "manoeuvres"
         self._kinds: set[tuple[object, ...]] = set()
 
+    @property
+    def uniform(self) -> bool:
+        """Whether the last generation was one of random points."""
+        return self.members[self._turn].uniform
+
     def ask(self) -> list[Point]:
         self._turn = self._chosen()
         return self.members[self._turn].ask()

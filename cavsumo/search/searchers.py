@@ -28,7 +28,13 @@ class Told(NamedTuple):
 
 
 class Searcher(Protocol):
-    """Chooses the points of a generation from what came of those before."""
+    """Chooses the points of a generation from what came of those before.
+
+    Attributes:
+        uniform: whether the points that were asked for last are uniform over the space.
+    """
+
+    uniform: bool
 
     def ask(self) -> list[Point]:
         """The points of the next generation."""
@@ -43,6 +49,7 @@ class RandomSearch:
 
     space: Space
     rng: np.random.Generator
+    uniform: bool = True
 
     def ask(self) -> list[Point]:
         return list(self.rng.random((GENERATION, self.space.dimension)))

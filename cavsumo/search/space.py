@@ -25,6 +25,7 @@ from cavsumo.network.site import Site
 
 Point = NDArray[np.float64]  # shape (dimension,), each number in [0, 1]
 
+STRETCH_M = 20.0  # length of a cell along the ego's path
 PLACE_M = 0.5  # distance of two places along a pavement
 NEAREST_M = 12.0  # nearer to where the ego enters nobody can meet it in time
 SLOWEST_MPS = 0.3
@@ -98,6 +99,16 @@ class Space:
     def seen(self, point: Point) -> list[tuple[Place, WalkProgramme]]:
         """Places and programmes of the bodies that take part."""
         return [(place, programme) for place, programme in self._bodies(point) if programme]
+
+    def covered(self, points: Sequence[Point]) -> float:
+        """The share of coarse cells (place, side, moment, speed) of the first body with a point."""
+        stretches = {(p.left, p.along // STRETCH_M) for p in self.places}
+        cells = set()
+        for point in points:
+            place = self.place(point, 0)
+            thirds = (min(2, int(3 * point[NAMES.index(name)])) for name in ("zone", "speed"))
+            cells.add((place.left, place.along // STRETCH_M, *thirds))
+        return len(cells) / (9 * len(stretches))
 
     def _bodies(self, point: Point) -> list[tuple[Place, WalkProgramme | None]]:
         """The place and the programme of every body, None for one that stands by."""

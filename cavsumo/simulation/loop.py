@@ -44,9 +44,9 @@ class Episode:
     """The record of an episode, during and after it.
 
     ``seen``: all snapshots; frames and actions only where they are kept; ``drives``: whether the
-    ego steers itself; ``forecast``: what the testers said of it beforehand; ``starts``: where they started, and
-    ``waited``: where they were while the ego entered; ``departures``: of the background, None
-    where they were not recorded or do not tell all of it.
+    ego steers itself; ``forecast``: what the testers said of it beforehand; ``starts``: where they
+    started, and ``waited``: where they were while the ego entered; ``departures``: of the
+    background, None where they were not recorded or do not tell all of it.
     """
 
     judgement: Judgement
