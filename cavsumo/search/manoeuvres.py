@@ -17,29 +17,32 @@ from cavsumo.search.space import NAMES, Point, Space
 Range = tuple[float, float]
 STRAIGHT: Range = (0.45, 0.55)
 THROUGH: Range = (0.98, 1.0)
+LATE: Range = (0.1, 0.35)  # as the ego can hardly brake any more
+EARLY: Range = (0.3, 1.0)
 
 # For each manoeuvre the ranges of some numbers of ``space.NAMES``.
 MANOEUVRES: Mapping[str, Mapping[str, Range]] = {
-    "crosses": {"zone": (0.15, 0.6), "speed": (0.5, 1.0), "heading": STRAIGHT, "depth": THROUGH},
-    "crosses slowly": {"zone": (0.1, 0.7), "speed": (0.0, 0.35), "depth": THROUGH},
-    "comes towards": {"zone": (0.1, 0.8), "heading": (0.0, 0.3), "depth": THROUGH},
-    "walks away": {"zone": (0.1, 0.7), "heading": (0.7, 1.0), "depth": THROUGH},
+    "crosses": {"zone": LATE, "speed": (0.5, 1.0), "heading": STRAIGHT, "depth": THROUGH},
+    "crosses slowly": {"zone": LATE, "speed": (0.0, 0.35), "heading": STRAIGHT, "depth": THROUGH},
+    "comes towards": {"zone": LATE, "speed": (0.0, 0.6), "heading": (0.0, 0.35), "depth": THROUGH},
+    "walks away": {"zone": LATE, "heading": (0.65, 1.0), "depth": THROUGH},
     "hesitates": {
-        "zone": (0.3, 1.0), "depth": (0.1, 0.5), "resume": (0.1, 0.5), "heading_2": STRAIGHT,
-        "heading_3": STRAIGHT, "length_2": (0.5, 1.0),
+        "zone": EARLY, "depth": (0.05, 0.4), "resume": (0.1, 0.5), "heading_2": STRAIGHT,
+        "heading_3": STRAIGHT,
     },
     "waits on the road": {
-        "zone": (0.5, 1.0), "depth": (0.0, 0.4), "resume": (0.55, 1.0), "heading_2": (0.3, 0.7),
+        "zone": EARLY, "depth": (0.0, 0.35), "resume": (0.55, 0.8), "heading_2": STRAIGHT,
         "heading_3": STRAIGHT,
     },
     "turns back": {
-        "zone": (0.1, 0.9), "depth": (0.5, 1.0), "resume": (0.0, 0.3), "heading_2": (0.8, 1.0),
+        "zone": (0.2, 1.0), "depth": (0.6, 0.97), "resume": (0.0, 0.3), "heading_2": (0.85, 1.0),
         "length_2": (0.3, 1.0), "heading_3": (0.9, 1.0),
     },
     "turns in": {
-        "zone": (0.3, 1.0), "depth": (0.1, 0.45), "resume": (0.0, 0.2), "heading_2": (0.6, 0.85),
+        "zone": EARLY, "depth": (0.0, 0.35), "resume": (0.0, 0.15), "heading_2": (0.15, 0.3),
         "heading_3": (0.4, 0.6), "length_2": (0.1, 0.8),
     },
+    "stands": {"zone": EARLY, "depth": (0.35, 0.8), "resume": (0.4, 0.5)},
 }  # fmt: skip
 
 

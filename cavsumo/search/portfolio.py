@@ -58,6 +58,6 @@ class Portfolio:
         if self._generation < FIRST:
             return "manoeuvres"
         names = list(self.members)
-        base = {"manoeuvres": 1.0, "neighbours": 1.5, "cma": 0.5, "random": 0.4}
+        base = {"manoeuvres": 1.0, "neighbours": 2.0, "cma": 0.3, "random": 0.3}
         weights = np.array([base[n] * (0.3 + self._worth[n]) for n in names])
         return names[int(self.rng.choice(len(names), p=weights / weights.sum()))]
