@@ -126,7 +126,7 @@ class BatchRun:
 
     @property
     def searches(self) -> dict[str, SearchFacts]:
-        """What the searching agents have found."""
+        """The findings of the searching agents."""
         return {label: search.facts() for label, search in self._knowledge.searches.items()}
 
     def end(self) -> None:

@@ -22,7 +22,7 @@ class Ended:
             hold however it was decided to stop.
         shared: episodes shared simulations, and those played in a fresh one are found tests.
         cut_short: somebody stopped it.
-        searches: by agent, what its search has found.
+        searches: by agent, the findings of its search.
         promises: by agent, the class of egos for which its forecasts hold.
     """
 

@@ -23,7 +23,7 @@ from cavsumo.model.bodies import kind_named
 from cavsumo.results.grade import INVALID_GRADE
 from cavsumo.results.rows import cell
 from cavsumo.search.methods import searcher_of
-from cavsumo.search.searchers import Told
+from cavsumo.search.searchers import PlayedPoint
 from cavsumo.search.space import Point, Space, space_of
 from cavsumo.search.words import in_common
 
@@ -32,7 +32,7 @@ SPEED_BIN_MPS, PLACE_BIN_M = 2.0, 10.0  # failures within a bin are alike
 
 @dataclass(frozen=True)
 class SearchFacts:
-    """What a search has found.
+    """The findings of a search.
 
     Attributes:
         episodes, seconds: how many points were played, and for how long in simulated time [s].
@@ -72,7 +72,7 @@ class Searching:
         self._searcher = searcher_of(method, self.space, np.random.default_rng(seed))
         self.points: list[Point] = []
         self._generation: list[int] = []  # episodes of the points that were asked for last
-        self._told: dict[int, Told] = {}
+        self._told: dict[int, PlayedPoint] = {}
         self._lasted: dict[int, float] = {}
         self._uniform: set[int] = set()
 
@@ -86,7 +86,7 @@ class Searching:
         return True
 
     def memory(self, run: int) -> Memory:
-        """What the agents have to know to play an episode whose point is known."""
+        """The memories with which the agents play an episode whose point is known."""
         return self.space.memories(self.points[self._number(run)])
 
     def told(self, row: Mapping[str, Any]) -> None:
@@ -98,7 +98,7 @@ class Searching:
             self._lasted[number] = float(cell(row["time_s"]) or 0.0)
 
     def facts(self) -> SearchFacts:
-        """What it has found so far."""
+        """The findings so far."""
         numbers = sorted(self._told)
         failed = [n for n in numbers if self._told[n].failed]
         first = None
@@ -131,15 +131,17 @@ class Searching:
         if self._searcher.uniform:
             self._uniform.update(self._generation)
 
-    def _result(self, point: Point, row: Mapping[str, Any]) -> Told:
-        """What came of a point; a row of this session and one that was recorded tell the same."""
+    def _result(self, point: Point, row: Mapping[str, Any]) -> PlayedPoint:
+        """The result of a point; a row of this session and one that was recorded tell the same."""
         text = {key: cell(row[key]) for key in ("grade", "outcome", "avoidable", "tester")}
         grade = float(text["grade"]) if text["grade"] else INVALID_GRADE
         failed = text["outcome"] == "violated" and text["avoidable"] != "0" and grade >= 0.0
-        return Told(grade, failed, self._kind(point, text["tester"], grade) if failed else ())
+        return PlayedPoint(
+            grade, failed, self._kind(point, text["tester"], grade) if failed else ()
+        )
 
     def _kind(self, point: Point, tester: str, impact: float) -> tuple[object, ...]:
-        """What makes two failures alike: impact speed, side and place."""
+        """Impact speed, side and place of a failure, by which failures are alike."""
         number = int(tester.removeprefix("tester")) if tester.startswith("tester") else 0
         place = self.space.place(point, number)
         return impact // SPEED_BIN_MPS, place.left, place.along // PLACE_BIN_M
@@ -154,7 +156,7 @@ def space_of_batch(prepared: PreparedBatch) -> Space:
 def searched(
     prepared: PreparedBatch, label: str, rows: Iterable[Mapping[str, Any]], run: int
 ) -> Memory:
-    """What the agents of a search had to know to play an episode, found from the rows before it.
+    """The memories with which the agents of a search played an episode, from the rows before it.
 
     Raises ResultsError where rows are missing.
     """

@@ -49,7 +49,7 @@ def exit_reason(found: Found, judged: bool) -> str:
 
 
 def searched(found: SearchFacts) -> str:
-    """What a search has found, or how much of the space it has seen without finding anything."""
+    """The findings of a search, or how much of the space it has seen without finding anything."""
     whole = f"{many(found.episodes, 'episode')} and {found.seconds:.0f} simulated seconds"
     if found.first is None:
         bound = rate(0, found.uniform, "exact").high if found.uniform else None

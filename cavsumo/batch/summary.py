@@ -206,7 +206,7 @@ def _say_failures(one: Ended, console: Console) -> None:
 
 
 def _say_searches(one: Ended, console: Console) -> None:
-    """What each search of a batch has found."""
+    """The findings of each search of a batch."""
     for agent, found in one.searches.items():
         _say(console, f"{_of(one)}{agent}: {sentences.searched(found)}")
 

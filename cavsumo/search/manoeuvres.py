@@ -1,7 +1,7 @@
 """Manoeuvres that pedestrians are known for, as distributions over the space of tests.
 
-Whoever searches begins here: a blindly timed crossing, somebody slow, oblique, who hesitates, turns
-back, or walks along the lane and turns in. Every number that a manoeuvre leaves open is uniform.
+A search begins here: a blindly timed crossing, somebody slow or oblique, who hesitates, turns back,
+or walks along the lane and turns in. Every number that a manoeuvre leaves open is uniform.
 """
 
 from __future__ import annotations
@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from cavsumo.search.searchers import GENERATION, Told
+from cavsumo.search.searchers import GENERATION, PlayedPoint
 from cavsumo.search.space import NAMES, Point, Space
 
 Range = tuple[float, float]
@@ -58,7 +58,7 @@ class ManoeuvreSearch:
     def ask(self) -> list[Point]:
         return [self._drawn() for _ in range(GENERATION)]
 
-    def tell(self, points: Sequence[Point], told: Sequence[Told]) -> None:
+    def tell(self, points: Sequence[Point], told: Sequence[PlayedPoint]) -> None:
         """Nothing is learned."""
 
     def _drawn(self) -> Point:

@@ -11,7 +11,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from cavsumo.search.searchers import GENERATION, Searcher, Told
+from cavsumo.search.searchers import GENERATION, PlayedPoint, Searcher
 from cavsumo.search.space import NAMES, Point, Space
 
 MANNER = ("speed", "heading", "depth")  # numbers whose thirds tell manners of walking apart
@@ -37,7 +37,7 @@ class NeighbourSearch:
             return self.first.ask()
         return [self._near(self._chosen()) for _ in range(GENERATION)]
 
-    def tell(self, points: Sequence[Point], told: Sequence[Told]) -> None:
+    def tell(self, points: Sequence[Point], told: Sequence[PlayedPoint]) -> None:
         for point, result in zip(points, told, strict=True):
             manner = tuple(min(2, int(3 * point[NAMES.index(name)])) for name in MANNER)
             if manner not in self.best or result.grade > self.best[manner][0]:

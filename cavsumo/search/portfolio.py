@@ -9,7 +9,7 @@ import numpy as np
 from cavsumo.search.evolution import EvolutionSearch
 from cavsumo.search.manoeuvres import ManoeuvreSearch
 from cavsumo.search.neighbours import NeighbourSearch
-from cavsumo.search.searchers import RandomSearch, Searcher, Told
+from cavsumo.search.searchers import PlayedPoint, RandomSearch, Searcher
 from cavsumo.search.space import Point, Space
 
 FIRST = 3  # generations of known manoeuvres before the others take part
@@ -43,7 +43,7 @@ class Portfolio:
         self._turn = self._chosen()
         return self.members[self._turn].ask()
 
-    def tell(self, points: Sequence[Point], told: Sequence[Told]) -> None:
+    def tell(self, points: Sequence[Point], told: Sequence[PlayedPoint]) -> None:
         self._generation += 1
         for name, member in self.members.items():
             if name in (self._turn, "neighbours"):

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import NamedTuple, Protocol
 
@@ -13,13 +13,13 @@ from cavsumo.search.space import Point, Space
 GENERATION = 10  # points that are chosen together, before any of them is played
 
 
-class Told(NamedTuple):
-    """What came of a point.
+class PlayedPoint(NamedTuple):
+    """The result of a point.
 
     Attributes:
         grade: how near it came to a preventable failure (``results.grade``).
         failed: whether it is a preventable failure.
-        kind: what makes two failures alike.
+        kind: of the failure; failures of one kind are alike.
     """
 
     grade: float
@@ -34,13 +34,14 @@ class Searcher(Protocol):
         uniform: whether the points that were asked for last are uniform over the space.
     """
 
-    uniform: bool
+    @property
+    def uniform(self) -> bool: ...
 
     def ask(self) -> list[Point]:
         """The points of the next generation."""
 
-    def tell(self, points: Sequence[Point], told: Sequence[Told]) -> None:
-        """What came of a generation; also of points that another searcher chose."""
+    def tell(self, points: Sequence[Point], told: Sequence[PlayedPoint]) -> None:
+        """Take up the results of a generation, which another searcher may have chosen."""
 
 
 @dataclass
@@ -54,8 +55,5 @@ class RandomSearch:
     def ask(self) -> list[Point]:
         return list(self.rng.random((GENERATION, self.space.dimension)))
 
-    def tell(self, points: Sequence[Point], told: Sequence[Told]) -> None:
+    def tell(self, points: Sequence[Point], told: Sequence[PlayedPoint]) -> None:
         """Nothing is learned."""
-
-
-Make = Callable[[Space, np.random.Generator], Searcher]

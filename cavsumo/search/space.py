@@ -82,7 +82,7 @@ class Space:
         return self.bodies * len(NAMES) + self.bodies - 1
 
     def memories(self, point: Point) -> tuple[dict[str, Any], ...]:
-        """What the agents of ``searched.SearchAgent`` remember to play a point."""
+        """The memories with which the agents of ``agents.searched`` play a point."""
         bodies = self._bodies(point)
         return tuple(
             {

@@ -1,4 +1,4 @@
-"""What failures have in common, in words."""
+"""Common features of failures, in words."""
 
 from __future__ import annotations
 
