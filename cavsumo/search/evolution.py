@@ -11,8 +11,8 @@ from cavsumo.search.searchers import GENERATION, PlayedPoint
 from cavsumo.search.space import Point, Space
 
 SIGMA = 0.22
-STALE = 6  # generations without progress before a restart
-PROGRESS = 0.02
+STALE = 10  # generations without progress before a restart
+PROGRESS = 0.01
 
 
 class EvolutionSearch:
