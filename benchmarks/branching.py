@@ -5,10 +5,12 @@
 
 Identity: episodes with traffic are branched in several timesteps, by a fork and by a replay, with
 the same agents, with others, with other actions, another ego and other random numbers; every
-snapshot of both is compared, and so is the episode itself with one that was never branched. Cost:
+snapshot of both is compared, and so is the episode itself with one that was never branched. An ego
+in another process must be refused. Cost:
 processor time of both processes for branches of 30 timesteps after prefixes of several lengths.
 Resources: processes, descriptors and memory after many branches. Failures: verdicts of reference
-drivers by reruns from the start, by forks of one rerun, and as they are judged by default.
+drivers by reruns from the start, by forks of one rerun, and as they are judged by default, with and
+without the question for the ideal driver.
 """
 
 from __future__ import annotations
@@ -36,12 +38,17 @@ from cavsumo.model.bodies import NOOP
 from cavsumo.model.forks import can_fork, cost_of_fork, result_of
 from cavsumo.model.scenario import plan_from
 from cavsumo.simulation import avoidability, checkpoints
+from cavsumo.simulation.avoidability import AvoidabilityCheck
 from cavsumo.simulation.branching import Continuation, branch, branches
-from cavsumo.simulation.loop import Episode, EpisodeLoop, played_on
+from cavsumo.simulation.episode import Episode
+from cavsumo.simulation.loop import EpisodeLoop, played_on
 
 NETS = ("crossing", "junction", "pedestrians")
 AT = (5, 25, 60)  # timesteps in which episodes are branched
 BRANCH = 30  # timesteps of a branch whose cost is measured
+DEFAULT, ONE = "default", "default without the ideal driver"
+NOBODY: Callable[..., None] = lambda *_: None  # noqa: E731  # in place of the ideal driver's answer
+OUTSIDE = Path(__file__).resolve().parent.parent / "examples/egos/stop_for_pedestrians.py"
 PREFIXES = (20, 60, 200)
 SLOW = {"ego": "constant", "ego_params": {"speed": 1.0}}  # still on its way after all of them
 BLIND = {"ego": "constant", "ego_params": {"speed": 7.0}, "agents": ["timing"]}
@@ -58,6 +65,7 @@ def main() -> None:
     options = parser.parse_args()
     nets = options.net or NETS
     good = all([identity(net, kind, options.branches) for net in nets for kind in ("", "car")])
+    good &= refused(nets[0])
     for net in nets:
         cost(net, options.costs)
     leftovers(nets[0], options.many)
@@ -130,6 +138,20 @@ def identity(net: str, kind: str, branched: int) -> bool:
         flush=True,
     )
     return (same, alone, errors) == (asked, episodes, 0)
+
+
+def refused(net: str) -> bool:
+    """Whether a branch of an episode with an ego in another process is refused; prints it."""
+    with running(net, ego=f"exec:{sys.executable} {OUTSIDE}") as runner:
+        runner.try_out()  # which starts the program
+        loop = begun(runner, 0)
+        loop.step()
+        try:
+            branch(loop, Continuation(steps=1))
+        except BranchError as error:
+            print(f"refused  {Path(net).stem[:24]:25}exec: {error}", flush=True)
+            return True
+    return False
 
 
 def processor_time() -> float:
@@ -217,7 +239,8 @@ def failures(net: str, runs: int) -> bool:
     modes: dict[str, dict[str, Any]] = {
         "from the start": {"can_fork": lambda: False, "cost_of_fork": cost_of_fork},
         "forks of a rerun": {"can_fork": can_fork, "cost_of_fork": lambda: 0.0, "SLOW_S": 0.0},
-        "default": {"can_fork": can_fork, "cost_of_fork": cost_of_fork},
+        DEFAULT: {"can_fork": can_fork, "cost_of_fork": cost_of_fork},
+        ONE: {"can_fork": can_fork, "cost_of_fork": cost_of_fork},
     }
     verdicts: dict[str, list[Any]] = {mode: [] for mode in modes}
     spent = dict.fromkeys(modes, 0.0)
@@ -225,15 +248,19 @@ def failures(net: str, runs: int) -> bool:
         start = statistics.median(timed(lambda: begun(runner, 0)) for _ in range(3))
         for run in range(runs):
             for mode, patches in modes.items():
-                with mock.patch.multiple(avoidability, **patches):
+                asked = NOBODY if mode == ONE else AvoidabilityCheck._first_avoided
+                with (
+                    mock.patch.multiple(avoidability, **patches),
+                    mock.patch.object(AvoidabilityCheck, "_first_avoided", asked),
+                    mock.patch.object(checkpoints, "can_fork", lambda m=mode: m in (DEFAULT, ONE)),
+                ):
                     before = processor_time()
-                    with mock.patch.object(checkpoints, "can_fork", lambda m=mode: m == "default"):
-                        row = runner.play(job(runner.plan, run)).outcome.row
+                    row = runner.play(job(runner.plan, run)).outcome.row
                     spent[mode] += processor_time() - before
                 told = [row[key] for key in ("outcome", "avoidable", "last_chance_s", "margin_s")]
                 verdicts[mode].append((*told, row["avoidable_note"]))
-    failed = sum(told[0] == "violated" for told in verdicts["default"])
-    same = verdicts["from the start"] == verdicts["forks of a rerun"] == verdicts["default"]
+    failed = sum(told[0] == "violated" for told in verdicts[DEFAULT])
+    same = all(found == verdicts[DEFAULT] for found in verdicts.values())
     times = ", ".join(f"{1e3 * time / runs:.0f} {mode}" for mode, time in spent.items())
     print(
         f"failures {Path(net).stem[:24]:25}{failed} of {runs}, verdicts "

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import dataclasses
+import gzip
 import io
 import json
 import shutil
@@ -21,6 +22,7 @@ from cavsumo.batch.episode_runner import EpisodeRunner
 from cavsumo.batch.jobs import job
 from cavsumo.batch.prepared import manifest, prepare
 from cavsumo.model.scenario import plan_from
+from cavsumo.results.trace_file import unpacked
 from cavsumo.results.writing import Recorder
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -44,6 +46,10 @@ class Whole:
     def text(self, name: str) -> str:
         """A file as text."""
         return self.files[name].decode()
+
+    def trace(self, name: str) -> str:
+        """The text of a trace."""
+        return unpacked(self.files[name])
 
     def tree(self, name: str) -> Any:
         """A JSON file as a document."""
@@ -110,8 +116,8 @@ def strategies(whole: Whole, *, simulated: bool) -> dict[str, st.SearchStrategy[
     }
     study = {"net": "road.net.xml", "runs": 2, "vary": vary}
     base = {k: v for k, v in whole.files.items()}
-    lines = [json.loads(line) for line in whole.text("found/run000000.jsonl").splitlines()[:6]]
-    road = "run -n road.net.xml --ego constant --end 3 --reset shared"
+    lines = [json.loads(line) for line in whole.trace("found/run000000.jsonl.gz").splitlines()[:6]]
+    road = "run -n road.net.xml --ego constant --end 3"
     net, osm = whole.text("road.net.xml"), whole.text("cross.osm")
 
     def case(name: str, data: Any, *words: str) -> st.SearchStrategy[Case]:
@@ -147,11 +153,13 @@ def strategies(whole: Whole, *, simulated: bool) -> dict[str, st.SearchStrategy[
             "certify found.csv timing",
         ),
         "trace": case(
-            "found/run000001.jsonl",
-            json_lines(lines),
-            "replay found/run000001.jsonl",
-            "replay found/run000001.jsonl --recorded --html p.html",
-            "replay found/run000001.jsonl --recorded --fcd f.xml",
+            "found/run000001.jsonl.gz",
+            json_lines(lines)
+            | json_lines(lines).map(gzip.compress)
+            | torn(whole.files["found/run000001.jsonl.gz"]),
+            "replay found/run000001.jsonl.gz",
+            "replay found/run000001.jsonl.gz --recorded --html p.html",
+            "replay found/run000001.jsonl.gz --recorded --fcd f.xml",
             "replay found.csv 1 --recorded --html p.html --fcd f.xml",
             "report found.csv --html p.html --replays 3",
             "merge found.csv -o whole.csv",
@@ -210,15 +218,26 @@ def policies(draw: Any, whole: bytes) -> bytes:
     file = io.BytesIO()
     np.savez(file, **arrays)
     data = file.getvalue()
-    if draw(st.integers(0, 4)) == 0:
-        at = draw(st.integers(0, len(data) - 1))
-        return data[:at] if draw(st.booleans()) else data[:at] + b"\xff\x00" + data[at + 2 :]
-    return data
+    return draw(torn(data)) if draw(st.integers(0, 4)) == 0 else data
+
+
+@st.composite
+def torn(draw: Any, data: bytes) -> bytes:
+    """Bytes that end too early, or of which two are others."""
+    at = draw(st.integers(0, len(data) - 1))
+    return data[:at] if draw(st.booleans()) else data[:at] + b"\xff\x00" + data[at + 2 :]
 
 
 WORDS = (
     *("0", "-1", "1", "nan", "inf", "1e999", "9" * 400, "", " ", "x", "x" * 300, "../x", ".", "/"),
-    *("found.csv", "found.json", "found/run000001.jsonl", "road.net.xml", "cross.osm", "game.json"),
+    *(
+        "found.csv",
+        "found.json",
+        "found/run000001.jsonl.gz",
+        "road.net.xml",
+        "cross.osm",
+        "game.json",
+    ),
     *(
         "a=1",
         "a=",

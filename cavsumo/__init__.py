@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from cavsumo.api.results import Results as Results
     from cavsumo.api.results import load as load
     from cavsumo.api.running import run as run
+    from cavsumo.api.running import run_study as run_study
     from cavsumo.assertions.base import Assertion as Assertion
     from cavsumo.assertions.base import Judgement as Judgement
     from cavsumo.egos.base import Acceleration as Acceleration
@@ -36,6 +37,7 @@ __version__ = "0.1.0"
 # The public names, by the modules in which they stand.
 _PUBLIC = {
     "run": "api.running",
+    "run_study": "api.running",
     "load": "api.results",
     "Results": "api.results",
     "RecordedEpisode": "api.episodes",

@@ -21,6 +21,7 @@
 from __future__ import annotations
 
 import difflib
+import os
 from collections.abc import Iterable
 from enum import IntEnum
 
@@ -117,6 +118,14 @@ def shown(value: object) -> str:
     except (RecursionError, ValueError):  # nested, or with more digits than are printed
         text = f"a {type(value).__name__}"
     return text if len(text) <= SHOWN else text[:SHOWN] + "..."
+
+
+def plain(error: BaseException) -> str:
+    """An error in words; one of the system as the file and the reason, without its number."""
+    if not (isinstance(error, OSError) and error.strerror):
+        return str(error)
+    named = isinstance(error.filename, str | bytes | os.PathLike)
+    return f"{shown(os.fsdecode(error.filename))}: {error.strerror}" if named else error.strerror
 
 
 def sentence(error: BaseException) -> str:

@@ -34,7 +34,7 @@ from cavsumo.model.scenario import BatchPlan, plan_from
 from cavsumo.model.snapshot import BodyState, Snapshot
 from cavsumo.network.osm.netconvert import sumo_home
 from cavsumo.network.site import Site
-from cavsumo.results.traces import Trace, parsed
+from cavsumo.results.traces import Trace, trace_of
 from cavsumo.sumo.world import World
 
 NAMES = ("crossing", "junction", "pedestrians")
@@ -280,7 +280,8 @@ def shown(staged: Callable[..., tuple[BatchPlan, Site]]) -> tuple[Record, Trace,
     plan, site = staged("crossing", agents=["timing"], routes="auto")
     with EpisodeRunner(prepared_at(plan, site)) as runner:
         outcome = runner.play(dataclasses.replace(job(plan, 1), record=True)).outcome
-    trace = parsed(outcome.trace)
+    trace = trace_of(outcome)
+    assert trace is not None
     return Record(plan, trace.row, trace, trace.head, Path("results.csv")), trace, site
 
 

@@ -23,7 +23,7 @@ from cavsumo.batch.jobs import Job
 from cavsumo.batch.messages import Answer
 from cavsumo.batch.worker import Worker
 from cavsumo.cli import main
-from cavsumo.errors import BatchError, CavsumoError, InputError
+from cavsumo.errors import BatchError, CavsumoError, InputError, plain
 
 _RUNNERS: dict[Worker, EpisodeRunner] = {}
 _ONE_SUMO = threading.RLock()  # for all threads of this process
@@ -57,7 +57,7 @@ def _start(self: Worker) -> None:
             runner.try_out()
         except (CavsumoError, OSError) as error:
             _close(self)
-            raise InputError(str(error)) from error
+            raise InputError(plain(error)) from error
 
 
 def _play(self: Worker, job: Job) -> Answer:

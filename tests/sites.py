@@ -15,7 +15,7 @@ from cavsumo.network.site import Site, derive_site
 from cavsumo.testing import assertion_checks
 from cavsumo.testing.scripts import Others, ScriptNetwork, nobody
 
-IMPORTED_BY = ("cavsumo.batch.prepared", "cavsumo.testing.scripts")
+IMPORTED_BY = ("cavsumo.network.site_cache", "cavsumo.testing.scripts")
 
 
 @contextmanager

@@ -18,7 +18,8 @@ from cavsumo.model.scenario import BatchPlan
 from cavsumo.model.scene import Scene
 from cavsumo.model.snapshot import BodyState, Snapshot
 from cavsumo.network.site import Site
-from cavsumo.simulation.loop import Episode, play
+from cavsumo.simulation.episode import Episode
+from cavsumo.simulation.loop import play
 from cavsumo.simulation.setup import make_setup
 
 Speed = Callable[[Snapshot], float | Drive]  # the speed that the ego wants [m/s], or how it steers

@@ -4,21 +4,26 @@ from __future__ import annotations
 
 import contextlib
 import importlib.util
+import json
 import shutil
 import subprocess
 import sys
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import Executor, Future
 from pathlib import Path
 from typing import Any
 
 from cavsumo.agents.casting import resolve_cast
 from cavsumo.batch.prepared import PreparedBatch
+from cavsumo.model.bodies import Action
 from cavsumo.model.scenario import BatchPlan
+from cavsumo.model.snapshot import Snapshot
 from cavsumo.network.site import Site
+from cavsumo.results.frame_text import frame_lines
 from cavsumo.results.provenance import checksums, versions
 from cavsumo.results.reading import read_manifest, read_rows
+from cavsumo.results.trace_file import unpacked
 
 ROOT = Path(__file__).parents[1]  # the repository
 DATA = ROOT / "tests" / "data"
@@ -58,8 +63,20 @@ def rows(file: Path) -> list[dict[str, str]]:
 
 
 def traces(file: Path) -> dict[str, str]:
-    """The traces by name."""
-    return {f.name: f.read_text(encoding="utf-8") for f in file.with_suffix("").glob("run*")}
+    """The texts of traces and logs by name."""
+    return {f.name: unpacked(f.read_bytes()) for f in file.with_suffix("").glob("run*")}
+
+
+def frame(snapshot: Snapshot, actions: Sequence[Action] = ()) -> dict[str, Any]:
+    """A snapshot as a frame of a trace."""
+    (line,) = frame_lines([snapshot], [actions])
+    found: dict[str, Any] = json.loads(line)
+    return found
+
+
+def json_lines(*lines: Any) -> str:
+    """A trace as text, from its head and its frames."""
+    return "".join(json.dumps(line) + "\n" for line in lines)
 
 
 def content(folder: Path) -> dict[str, bytes]:

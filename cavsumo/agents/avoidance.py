@@ -90,6 +90,11 @@ class Avoidance:
             self._side, self.waited = -self._side, 0.0
         return _brake(state, self.scene.dt)
 
+    @property
+    def at_rest(self) -> bool:
+        """Whether it has not waited and is not turning."""
+        return self._turning is None and not self.waited and not self.tired
+
     def rest(self) -> None:
         """Reset the waiting time."""
         self._until = self._turning = None

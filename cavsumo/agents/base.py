@@ -113,6 +113,13 @@ class Agent:
     def remember(self, memory: Any) -> None:
         """Take up the knowledge of an earlier instance of this agent."""
 
+    def check_memory(self, memory: Any, bodies: int) -> None:
+        """Raise an exception unless it can take up this knowledge, which comes from a file.
+
+        ``bodies``: how many it owns.
+        """
+        self.remember(memory)
+
     def own(self, snapshot: Snapshot) -> list[BodyState]:
         """The states of the owned bodies."""
         return [snapshot.testers[i] for i in self.owned]

@@ -85,10 +85,14 @@ class Walker:
         return self._crossing.crossing is not None
 
     def idle(self, snapshot: Snapshot, state: BodyState) -> Action:
-        if self._avoidance.tired and isinstance(self._idle, Stroll):
+        avoidance = self._avoidance
+        if avoidance.tired and isinstance(self._idle, Stroll):
             self._idle.turn_back(state)
-            self._avoidance.turn_back(state)
-        return self._avoidance.along(snapshot, state, self._idle.action(state))
+            avoidance.turn_back(state)
+        action = self._idle.action(state)
+        if state.v <= 0.0 and action.throttle <= 0.0 and avoidance.at_rest:
+            return action  # it stands and stays: most of the time, at the kerb
+        return avoidance.along(snapshot, state, action)
 
     def begin(self, state: BodyState) -> bool:
         if not self._crossing.begin(state):

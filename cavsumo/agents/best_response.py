@@ -40,7 +40,7 @@ from cavsumo.agents.planning.response import (
 from cavsumo.agents.triggers import Timing, time_to_walk
 from cavsumo.agents.walking import ApproachKerb, CrossingWalk, walk
 from cavsumo.model.bodies import NOOP, Action, Kind
-from cavsumo.model.checks import choice, number, truth
+from cavsumo.model.checks import choice, number, truth, whole
 from cavsumo.model.documents import json_of, read_text
 from cavsumo.model.kinematics import wrap
 from cavsumo.model.scene import Scene
@@ -118,9 +118,14 @@ class BestResponseAgent(Agent):
         }
 
     def remember(self, memory: Any) -> None:
-        self.episodes = int(memory["episodes"])
+        self.episodes = whole("episodes", memory["episodes"])
         self.counts = Counts.of(memory["counts"])
         self.planned = json.dumps(memory["planned"], sort_keys=True) if memory["planned"] else ""
+
+    def check_memory(self, memory: Any, bodies: int) -> None:
+        self.remember(memory)
+        if memory["planned"] is not None:
+            Counts.of(memory["planned"])
 
     def reset(self, scene: Scene, owned: Sequence[int], rng: np.random.Generator) -> None:
         super().reset(scene, owned, rng)

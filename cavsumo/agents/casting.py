@@ -6,15 +6,17 @@ which the agents are built where they play.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 from cavsumo.agents.base import AGENTS, Agent
 from cavsumo.agents.names import PREFIX, policy_file
 from cavsumo.agents.policy import make_agent, parameters_of
-from cavsumo.errors import InputError, UnknownName
+from cavsumo.errors import InputError
 from cavsumo.model.bodies import Body, kind_named, model_of
+from cavsumo.model.names import check_shared
 from cavsumo.model.objects import is_here, is_object
 from cavsumo.model.plugins import source_file
 from cavsumo.model.scenario import BatchPlan, Params, Scenario
@@ -57,10 +59,12 @@ class Cast:
     Attributes:
         members: in the order in which they take turns.
         agents_each: how many agents of a member play in an episode, one for each team.
+        bodies_each: how many bodies each of them owns.
     """
 
     members: tuple[CastMember, ...]
     agents_each: int
+    bodies_each: int
 
     def __iter__(self) -> Iterator[CastMember]:
         return iter(self.members)
@@ -92,6 +96,23 @@ class Cast:
         member = self[label]
         return [member.make() for _ in range(self.agents_each)]
 
+    def check_memory(self, label: str, memory: Sequence[Any] | None, source: str) -> None:
+        """Raise InputError unless the agents of a label can have known this before an episode.
+
+        Args:
+            memory: the knowledge of each of them; None for none.
+            source: names its file.
+        """
+        agents = [] if memory is None else self.agents(label)
+        wrong = InputError(f"{source}: is not what agent {label} can have known")
+        if len(agents) != len(memory or ()):
+            raise wrong
+        for agent, known in zip(agents, memory or (), strict=True):
+            try:
+                agent.check_memory(known, self.bodies_each)
+            except Exception as error:  # also of a user's class, of any sort
+                raise wrong from error
+
 
 def resolve_cast(plan: BatchPlan) -> Cast:
     """Build every agent once and account for every parameter; raises InputError."""
@@ -108,7 +129,7 @@ def resolve_cast(plan: BatchPlan) -> Cast:
         except ValueError as error:
             raise InputError(f"agent {label}: {error}") from error
         members.append(_member(plan, label, agent, *present))
-    return Cast(tuple(members), len(teams(plan.scenario)))
+    return Cast(tuple(members), len(teams(plan.scenario)), each)
 
 
 def _present(plan: BatchPlan, label: str) -> tuple[str, Params]:
@@ -117,10 +138,14 @@ def _present(plan: BatchPlan, label: str) -> tuple[str, Params]:
     file = policy_file(name)
     if file is not None:
         return f"{PREFIX}{scenario.present(file)}", params
-    named = getattr(AGENTS.get(name), "FILES", ()) if name in AGENTS else ()
-    files = {key: Path(str(params[key])) for key in named if key in params}
+    files = {key: Path(str(params[key])) for key in _file_keys(name) if key in params}
     present = {key: scenario.present(file) for key, file in files.items()}
     return name, params | {key: str(present[key]) for key in files if present[key] != files[key]}
+
+
+def _file_keys(name: str) -> tuple[str, ...]:
+    """The parameters of a registered agent that name files."""
+    return tuple(getattr(AGENTS.get(name), "FILES", ())) if name in AGENTS else ()
 
 
 def _member(
@@ -149,17 +174,23 @@ def params_of(plan: BatchPlan, label: str) -> Params:
 
 
 def shown_manoeuvres(plan: BatchPlan) -> set[str]:
-    """The manoeuvres that a plan's agents are asked for, without reading a policy's file.
+    """The manoeuvres that a plan's agents are asked for, without reading files of theirs.
 
-    An episode is shown where that file may be missing; what a policy does is in its file alone. It
-    is also shown without an agent that was an object of another session.
+    An episode is shown where a policy's file or one that a parameter names may be missing. It is
+    also shown without an agent that was an object of another session.
     """
-    return {
-        Agent.manoeuvre
-        if policy_file(name) is not None or (is_object(name) and not is_here(name))
-        else make_agent(name, params_of(plan, label)).manoeuvre
-        for label, name in plan.cast.items()
-    }
+    return {_shown_manoeuvre(plan, label) for label in plan.cast}
+
+
+def _shown_manoeuvre(plan: BatchPlan, label: str) -> str:
+    """The manoeuvre of an agent of a plan; that of any agent where it cannot be built."""
+    name = plan.cast[label]
+    if policy_file(name) is not None or (is_object(name) and not is_here(name)):
+        return Agent.manoeuvre
+    params = params_of(plan, label)
+    if not params.keys().isdisjoint(_file_keys(name)):
+        return str(getattr(AGENTS.get(name), "manoeuvre", Agent.manoeuvre))
+    return make_agent(name, params).manoeuvre
 
 
 def teams(scenario: Scenario) -> tuple[tuple[int, ...], ...]:
@@ -179,9 +210,4 @@ def tester_bodies(scenario: Scenario) -> tuple[Body, ...]:
 def _check_parameters(plan: BatchPlan) -> None:
     """Refuse parameters that no agent of the plan has."""
     known = {label: [p.name for p in parameters_of(name)] for label, name in plan.cast.items()}
-    shared = {key for keys in known.values() for key in keys}
-    qualified = {f"{label}.{key}" for label, keys in known.items() for key in keys}
-    for key in plan.params:
-        valid = qualified if "." in key else shared
-        if key not in valid:
-            raise UnknownName("parameter", key, valid, f"agent {' '.join(plan.agents)}")
+    check_shared(plan.params, known, f"agent {' '.join(plan.agents)}")

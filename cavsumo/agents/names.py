@@ -24,12 +24,27 @@ AGENT_NAMES = Names(
         "search": "searched",
         "timing": "programmed",
     },
+    {
+        "best-response": "aim model learn explore replan missed unfair confidence run_up_m",
+        "election": "distance_m rule idle manoeuvre",
+        "expectiminimax": "against price_per_s grid_s top accel",
+        "programmed-random": "rate_per_s epsilon idle manoeuvre",
+        "proximity": "distance_m idle manoeuvre",
+        "q-learning": "alpha gamma epsilon half_life hold_s weights learn",
+        "random": "rate_per_s epsilon between",
+        "timing": "aim idle manoeuvre",
+    },
 )
 
 SEARCH = "search"  # the agent whose tests a searcher chooses, by one of these methods
 SEARCH_METHODS = ("portfolio", "random", "manoeuvres", "neighbours", "cma")
 
 PREFIX = "policy:"
+
+
+def declared_parameters(spec: str) -> tuple[str, ...] | None:
+    """The parameters of an agent that comes with cavsumo; a policy has none. None for another."""
+    return AGENT_NAMES.parameters(spec) if policy_file(spec) is None else ()
 
 
 def policy_file(spec: str) -> Path | None:

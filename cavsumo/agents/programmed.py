@@ -55,9 +55,11 @@ class ProgrammedAgent(Agent):
 
     def _choose(self, i: int, snapshot: Snapshot, state: BodyState) -> Action:
         programmed = self.behaviours[i]
-        if programmed.active and programmed.over(state):
+        active = programmed.active
+        if active and programmed.over(state):
             programmed.end()  # and the trigger may hold at once, as in the listing
-        if programmed.active or (self.starts(i, snapshot, state) and programmed.begin(state)):
+            active = programmed.active
+        if active or (self.starts(i, snapshot, state) and programmed.begin(state)):
             return programmed.act(snapshot, state)
         return programmed.idle(snapshot, state)
 

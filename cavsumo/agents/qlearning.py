@@ -21,10 +21,12 @@ from cavsumo.agents.base import AGENTS, Agent, learner_of
 from cavsumo.agents.features import FEATURES, TARGETS, Features, towards
 from cavsumo.agents.staying import Staying
 from cavsumo.model.bodies import Action
-from cavsumo.model.checks import number, truth
+from cavsumo.model.checks import number, truth, whole
 from cavsumo.model.documents import json_of, read_text
 from cavsumo.model.scene import Scene
 from cavsumo.model.snapshot import Snapshot
+
+LARGEST = 1e100  # a weight; sums and products of larger ones may overflow
 
 
 @AGENTS.register("q-learning")
@@ -71,8 +73,8 @@ class QLearningAgent(Agent):
         }
 
     def remember(self, memory: Any) -> None:
-        self.weights = [float(memory["weights"][name]) for name in FEATURES]
-        self.episodes = int(memory["episodes"])
+        self.weights = weights_in(memory)
+        self.episodes = whole("episodes", memory["episodes"])
 
     def reset(self, scene: Scene, owned: Sequence[int], rng: np.random.Generator) -> None:
         super().reset(scene, owned, rng)
@@ -164,10 +166,14 @@ def load_weights(file: Path) -> list[float]:
         data = json_of(text)
         if "learned" in data:  # the manifest of a batch
             data = learner_of(data["learned"], "q-learning")[0]
-        weights = [number(name, data["weights"][name]) for name in FEATURES]
+        return weights_in(data)
     except (ValueError, KeyError, TypeError, IndexError, AttributeError) as error:
         raise ValueError(
             f"weights {str(file)!r}: expected a JSON object with 'weights', finite numbers for the "
             f"features {', '.join(FEATURES)}"
         ) from error
-    return weights
+
+
+def weights_in(data: Any) -> list[float]:
+    """The weights in the knowledge of an agent; an exception where they are missing or damaged."""
+    return [number(name, data["weights"][name], -LARGEST, LARGEST) for name in FEATURES]

@@ -6,11 +6,13 @@ A record is made from an episode in memory (``simulation.playback``) or from its
 
 from __future__ import annotations
 
+import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from pydantic import BaseModel, ConfigDict
 
 from cavsumo.agents.base import AGENTS, Agent
 from cavsumo.errors import NoSuchAction
@@ -21,6 +23,7 @@ from cavsumo.model.kinematics import steering_for_turn, wrap
 from cavsumo.model.scene import Scene
 from cavsumo.model.snapshot import Snapshot
 
+FARTHEST = 1e8  # m from the origin, and m/s, rad
 Teams = Sequence[Sequence[int]]  # for each agent the indices of its bodies
 
 
@@ -89,11 +92,35 @@ class RecordedAgent(Agent):
             "actions": self._actions,
         }
 
+    def check_memory(self, memory: Any, bodies: int) -> None:
+        found = RecordedMemory.model_validate_json(json.dumps(memory))
+        for start in (*found.starts, *found.waited):
+            check_start(start)
+        numbers = {len(found.starts), len(found.waited)} - {0} | {*map(len, found.actions)}
+        if numbers - {bodies} or (found.waited and not found.starts):
+            raise ValueError(f"starts and actions of other than {bodies} bodies")
+
     def remember(self, memory: Mapping[str, Any]) -> None:
         self.recorded_starts, self.recorded_waits = (
             [start_of(start) for start in memory[key]] for key in ("starts", "waited")
         )
         self._actions = [tuple(Action(*one) for one in joint) for joint in memory["actions"]]
+
+
+class RecordedMemory(BaseModel):
+    """The knowledge of an agent that plays back, as it is read from a file."""
+
+    model_config = ConfigDict(extra="forbid", strict=True, allow_inf_nan=False)
+
+    starts: list[StartRecord]
+    waited: list[StartRecord]
+    actions: list[list[Action]]
+
+
+def check_start(start: StartRecord) -> None:
+    """Raise ValueError for a start so far away that the body would leave what a trace can hold."""
+    if not all(abs(number or 0.0) <= FARTHEST for number in (start.x, start.y, start.o, start.v)):
+        raise ValueError(f"a start at {start.x:g}, {start.y:g}, expected at most {FARTHEST:g}")
 
 
 def start_of(plain: Sequence[Any]) -> StartRecord:

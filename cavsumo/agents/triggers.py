@@ -70,7 +70,7 @@ class Timing:
         self._last: tuple[BodyState, float | None] | None = None
 
     def __call__(self, snapshot: Snapshot, state: BodyState) -> bool:
-        v = snapshot.ego.v
+        v = snapshot.ego[3]
         braking, reaction = 0.5 * v * v / MAX_DECEL, REACTION_TIME * v  # stopping_distances
         most = braking + self.aim * reaction
         if self.least_gap(snapshot, state) > most + ROUNDING_M:
@@ -87,7 +87,8 @@ class Timing:
         meeting point M along the path, and |MQ| >= |M ego| - |ego Q|. The distance |ego Q| grows by
         at most the way that the ego makes, measured from where it was last projected.
         """
-        entry = self._entry(state)
+        last = self._last
+        entry = last[1] if last is not None and last[0] is state else self._entry(state)
         if entry is None or self.meeting is None:
             return math.inf
         _, x, y, v, _ = snapshot.ego

@@ -25,6 +25,7 @@ from cavsumo.report.files import write_report_files
 from cavsumo.report.order import ReportOptions
 from cavsumo.results.columns import COLUMNS
 from cavsumo.results.failures import preventable_first
+from cavsumo.results.present import placed_scenario
 from cavsumo.results.reading import COMPLETE, read_results, whole_lines
 from cavsumo.results.recorded_plan import recorded_plan
 
@@ -97,10 +98,13 @@ class Results:
         """The scenario, how often it was played, and by which agents."""
         return self._recorded[0]
 
-    @property
+    @cached_property
     def scenario(self) -> Scenario:
-        """The scenario that was played; ``cavsumo.run`` takes it for a network."""
-        return self.plan.scenario
+        """The scenario that was played; ``cavsumo.run`` takes it for a network.
+
+        Files that are not where they were are taken from the results.
+        """
+        return placed_scenario(*self._recorded, self.file)
 
     @property
     def manifest(self) -> Mapping[str, Any]:
@@ -183,10 +187,8 @@ class Results:
     def _summary(self) -> ResultsSummary:
         """The summary of the results."""
         tally, judged = Tally(), self.plan.reference != "none"
-        for _, row in whole_lines(self.file):
-            if row is not None:
-                tally.add(row)
-        return ResultsSummary(self.scenario, tally, self.failures, judged, self._place)
+        tally.add_rows(row for _, row in whole_lines(self.file) if row is not None)
+        return ResultsSummary(self.plan.scenario, tally, self.failures, judged, self._place)
 
     @property
     def _place(self) -> str:

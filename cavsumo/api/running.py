@@ -1,9 +1,9 @@
-"""``cavsumo.run``: a batch of episodes, played as ``cavsumo run`` plays it."""
+"""``cavsumo.run`` and ``cavsumo.run_study``: batches, played as ``cavsumo run`` plays them."""
 
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -16,9 +16,10 @@ from cavsumo.batch.preflight import checked
 from cavsumo.batch.progress import is_shown
 from cavsumo.errors import InputError
 from cavsumo.model.named_networks import DEFAULT
+from cavsumo.model.objects import SentObject
 from cavsumo.model.scenario import Scenario
 from cavsumo.model.scenario_file import read_config
-from cavsumo.model.study import Part, overruled
+from cavsumo.model.study import Part, overruled, read_study
 
 FILE = "results.csv"  # of results without an output file
 
@@ -63,22 +64,47 @@ def run(
         KeyboardInterrupt: the user stopped it; finished rows are in ``output``.
     """
     given, objects = settings_of(net, settings)
+    places = net.places if isinstance(net, Scenario) else {}
     if config is not None:
         given = overruled(read_config(Path(config)), given)
+    part = Part("", given, {"net": DEFAULT})
+    manner = Manner(resume, retry_errors, overwrite, quiet=not (progress and is_shown()))
+    (found,) = _played([part], places, output, _means(jobs, executor, scheduler), manner, objects)
+    return found
+
+
+def run_study(
+    config: str | os.PathLike[str],
+    *,
+    output: str | os.PathLike[str] | None = None,
+    jobs: int | None = None,
+    executor: Any = None,
+    scheduler: str | None = None,
+    progress: bool = True,
+    resume: bool = False,
+    retry_errors: bool = False,
+    overwrite: bool = False,
+    **settings: Any,
+) -> dict[str, Results]:
+    """Play the batches of a scenario file (TOML) with a table ``[vary]``, one after another.
+
+    Args:
+        config: the scenario file; the keywords win, but may not be what it varies.
+        output: the results file, to whose name that of each batch is added.
+        jobs, executor, scheduler, progress, resume, retry_errors, overwrite, **settings: see
+            ``run``.
+
+    Returns:
+        the results of each batch, by its name: ``testers3`` for ``testers = [1, 3]``.
+
+    Raises as ``run``; all batches are checked before any is played.
+    """
+    given, objects = settings_of(None, settings)
+    parts = read_study(Path(config), given)
     manner = Manner(resume, retry_errors, overwrite, quiet=not (progress and is_shown()))
     means = _means(jobs, executor, scheduler)
-    if output is None and (resume or retry_errors):
-        raise InputError("run: resume and retry_errors go on with an output; none is given")
-    if output is not None:
-        _play(given, Path(output), means, manner)
-        return Results(Path(output), trusted=True, objects=tuple(objects))
-    folder = TemporaryFolder()
-    try:
-        _play(given, folder.path / FILE, means, manner)
-    except BaseException:
-        folder.close()
-        raise
-    return Results(folder.path / FILE, trusted=True, folder=folder, objects=tuple(objects))
+    found = _played(parts, {}, output, means, manner, objects)
+    return {part.name: results for part, results in zip(parts, found, strict=True)}
 
 
 def _means(jobs: int | None, executor: Any, scheduler: str | None) -> Means:
@@ -88,11 +114,43 @@ def _means(jobs: int | None, executor: Any, scheduler: str | None) -> Means:
     return Means(jobs, "local" if scheduler is None else "dask", scheduler)
 
 
-def _play(settings: Mapping[str, Any], file: Path, means: Means, manner: Manner) -> None:
-    """Play a batch into a file."""
-    (batch,) = checked([Part("", dict(settings), {"net": DEFAULT})], file, manner)
-    said = ", ".join(f"{key}={value!r}" for key, value in settings.items())
-    manifest = {**batch.manifest, "command": [], "call": f"cavsumo.run({said})"}
-    _, interrupted = played([replace(batch, manifest=manifest)], means, manner)
+def _played(
+    parts: Sequence[Part],
+    places: Mapping[str, Path],
+    output: str | os.PathLike[str] | None,
+    means: Means,
+    manner: Manner,
+    objects: Sequence[SentObject],
+) -> list[Results]:
+    """The results of batches, in a temporary folder without an output.
+
+    ``places`` as in ``Scenario.placed``.
+    """
+    if output is None and (manner.resume or manner.retry_errors):
+        raise InputError("run: resume and retry_errors go on with an output; none is given")
+    folder = TemporaryFolder() if output is None else None
+    file = folder.path / FILE if folder is not None else Path(output or FILE)
+    try:
+        _play(parts, places, file, means, manner)
+    except BaseException:
+        if folder is not None:
+            folder.close()
+        raise
+    return [
+        Results(part.output(file), trusted=True, folder=folder, objects=tuple(objects))
+        for part in parts
+    ]
+
+
+def _play(
+    parts: Sequence[Part], places: Mapping[str, Path], file: Path, means: Means, manner: Manner
+) -> None:
+    """Play batches into files."""
+    batches = []
+    for part, batch in zip(parts, checked(parts, file, manner, places), strict=True):
+        said = ", ".join(f"{key}={value!r}" for key, value in part.settings.items())
+        manifest = {**batch.manifest, "command": [], "call": f"cavsumo.run({said})"}
+        batches.append(replace(batch, manifest=manifest))
+    _, interrupted = played(batches, means, manner)
     if interrupted:
         raise KeyboardInterrupt

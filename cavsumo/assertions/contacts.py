@@ -91,12 +91,14 @@ class ContactMonitor:
         body, x, y, _, _ = ego
         own = body.kind.reach
         pairs: list[Pair] = []
+        hypot, upper = math.hypot, self._upper
         for tester in snapshot.testers:
             other, there_x, there_y, _, _ = tester
-            distance = math.hypot(there_x - x, there_y - y)
+            distance = hypot(there_x - x, there_y - y)
             reach = own + other.kind.reach
-            if distance - reach < self._upper:
+            if distance - reach < upper:
                 self._note(distance, distance - reach, ego, tester)
+                upper = self._upper
                 if distance <= reach and overlap(ego.box, tester.box):
                     pairs.append((ego, tester))
         if snapshot.raw_background:

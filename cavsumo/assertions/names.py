@@ -21,6 +21,22 @@ ASSERTION_NAMES = Names(
         "ttc": "criticality",
         "two-second-gap": "two_second_gap",
     },
+    {
+        "drac": "most",
+        "give-way": "kerb_m every",
+        "hard-braking": "most at_all",
+        "leaving-the-road": "tolerance_m",
+        "pet": "least_s",
+        "reaction-zone": "max_decel reaction_time clear_s",
+        "red-light": "within_m amber",
+        "rss": "rho a_max_accel b_min b_min_correct b_max a_lat_max_accel b_lat_min mu "
+        "lateral_noise",
+        "speed-limit": "share plus_mps",
+        "standing": "most_s near_m",
+        "stopping-distance": "wet grace_s braking",
+        "ttc": "least_s",
+        "two-second-gap": "gap_s wet grace_s from_mps",
+    },
 )
 
 

@@ -25,6 +25,8 @@ from cavsumo.agents.walking import turn_limit
 from cavsumo.assertions.base import NOT_TRIGGERED, Judgement
 from cavsumo.assertions.contacts import STANDING_MPS, Pair, depth
 from cavsumo.model.bodies import WALKING, Kind
+from cavsumo.model.carriageway import Roads
+from cavsumo.model.cells import Cells
 from cavsumo.model.kinematics import wrap
 from cavsumo.model.scene import Scene
 from cavsumo.model.snapshot import BodyState, Snapshot
@@ -67,6 +69,8 @@ class ValidityMonitor:
         # The last place checked for each body, and the distance from there within which it is
         # valid.
         self._known = [(math.inf, math.inf, 0.0)] * len(scene.bodies)
+        roads = scene.roads
+        self._worlds = [None if roads is None else _world(roads, b.kind) for b in scene.bodies]
 
     def observe(self, snapshot: Snapshot, pairs: Sequence[Pair]) -> None:
         """Take in a snapshot and the pairs that touch in it."""
@@ -138,8 +142,10 @@ class ValidityMonitor:
         """Whether a tester left the world or moved as it cannot."""
         dt = self._scene.dt
         for i, body in enumerate(snapshot.testers):
-            before = self._testers[i] if self._testers else body
-            if before is not body and not possible(before, body, dt):
+            before = self._testers[i] if self._testers else None
+            if before is body or body.body.id in self.breaches:
+                continue  # it stands, or broke a rule already
+            if before is not None and not possible(before, body, dt):
                 self._report(snapshot, body.id, f"moved as no {body.body.kind.name} can")
             x, y, leeway = self._known[i]
             if math.hypot(body.x - x, body.y - y) >= leeway and not self._in_world(i, body):
@@ -147,14 +153,10 @@ class ValidityMonitor:
 
     def _in_world(self, i: int, body: BodyState) -> bool:
         """Whether a body is inside the world."""
-        roads, on_foot = self._scene.roads, body.body.kind.name in WALKING
-        if roads is None:
-            self._known[i] = body.x, body.y, math.inf
-            return True
-        far = roads.walking_distance if on_foot else roads.driving_distance
-        room = (STRAY_M if on_foot else OFF_ROAD_M) - far(body.x, body.y)
-        self._known[i] = body.x, body.y, max(0.0, room)
-        return room >= 0.0 or self._drives_out(i, body)
+        world = self._worlds[i]
+        inside, room = (True, math.inf) if world is None else world.at(body.x, body.y)
+        self._known[i] = body.x, body.y, room if inside else 0.0
+        return inside or self._drives_out(i, body)
 
     def _drives_out(self, i: int, body: BodyState) -> bool:
         """Whether a vehicle is beyond the end of its way, where the network ends."""
@@ -162,6 +164,12 @@ class ValidityMonitor:
         if approach is None:
             return False
         return approach.path.project(body.x, body.y).along >= approach.path.length - OFF_ROAD_M
+
+
+def _world(roads: Roads, kind: Kind) -> Cells:
+    """Whether places are inside the world of a kind of body."""
+    on_foot = _walks(kind)
+    return roads.within(STRAY_M if on_foot else OFF_ROAD_M, on_foot=on_foot)
 
 
 def possible(before: BodyState, after: BodyState, dt: float) -> bool:
@@ -174,7 +182,10 @@ def possible(before: BodyState, after: BodyState, dt: float) -> bool:
         and kind.v_min - ROUNDING <= after.v <= max(kind.v_max, v) + ROUNDING
         and gained <= kind.throttle_max * dt + ROUNDING
         and (gained >= kind.throttle_min * dt - ROUNDING or after.v >= kind.v_max)
-        and abs(wrap(after.o - before.o)) <= turn_limit(kind, abs(v), dt) + ROUNDING
+        and (
+            after.o == before.o
+            or abs(wrap(after.o - before.o)) <= turn_limit(kind, abs(v), dt) + ROUNDING
+        )
     )
 
 

@@ -18,7 +18,6 @@ from cavsumo.batch.stopping import stopping_rule
 from cavsumo.batch.tally import Tally
 from cavsumo.egos.ego_files import OutputWatch
 from cavsumo.errors import BatchError
-from cavsumo.model.scenario import BatchPlan
 from cavsumo.results.reading import COMPLETE, check_cells, rows_of
 from cavsumo.results.rows import Outcome
 from cavsumo.results.writing import Recorder
@@ -53,6 +52,7 @@ class BatchRun:
     left_out: list[Path] = field(default_factory=list)
 
     def __post_init__(self) -> None:
+        self._noted = False
         self._watch = OutputWatch(self.prepared.plan.scenario.ego, self.prepared.checksums)
 
     def begin(self, manifest: Mapping[str, Any], *, overwrite: bool = False) -> None:
@@ -66,14 +66,18 @@ class BatchRun:
         """Take up the recorded rows."""
         self._todo = self.prepared.plan.todo()
         self._knowledge = Knowledge(self.prepared, manifest)
-        for row in self.recorder.resume(manifest, self._todo):
-            check_cells(self.recorder.csv_file, row)
-            self.tally.add(row)
-            self._knowledge.seen(row)
+        self.tally.add_rows(self._recorded(manifest))
         self._knowledge.catch_up(self.executor)
         self.left_out = self.recorder.keep(self.prepared.inputs)
         recorded = manifest["status"]
         self.status = recorded if recorded in COMPLETE else "interrupted"
+
+    def _recorded(self, manifest: Mapping[str, Any]) -> Iterator[Mapping[str, Any]]:
+        """The recorded rows, checked, and seen by those who learn from them."""
+        for row in self.recorder.resume(manifest, self._todo):
+            check_cells(self.recorder.csv_file, row)
+            self._knowledge.seen(row)
+            yield row
 
     def play(self) -> None:
         """Play the remaining episodes, until the end or a reason to stop."""
@@ -81,7 +85,7 @@ class BatchRun:
         rule = stopping_rule(self.prepared.plan)
         reason = rule(self.tally)
         with Progress(self.prepared.plan.size, self.quiet, self.tally.rows) as progress:
-            for answer in self._answers(self._todo) if reason is None else ():
+            for answer in self._answers(self._todo, progress) if reason is None else ():
                 row = self.recorder.write(answer.outcome)
                 self.tally.add(row)
                 learned = self._knowledge.learned(row, answer.memory) and self._knowledge.due
@@ -102,15 +106,13 @@ class BatchRun:
         change.
         """
         todo, relearning = _to_retry(
-            self.recorder.csv_file,
-            self.prepared.plan,
-            self._knowledge.names | self.prepared.cast.searchers,
+            self.recorder.csv_file, self._knowledge.names | self.prepared.cast.searchers
         )
         known = self._knowledge.known()
         self._knowledge.forget(relearning)
         replaced: dict[int, Outcome] = {}
         with Progress(len(todo), self.quiet) as progress:
-            for answer in self._answers(todo):
+            for answer in self._answers(todo, progress):
                 row = answer.outcome.row
                 self._knowledge.learned(row, answer.memory)
                 replaced[row["run"]] = answer.outcome
@@ -121,8 +123,7 @@ class BatchRun:
             raise BatchError("interrupted before the learning agents were done: nothing changed")
         self.recorder.replace(replaced)
         self.tally = Tally()
-        for row in rows_of(self.recorder.csv_file):
-            self.tally.add(row)
+        self.tally.add_rows(rows_of(self.recorder.csv_file))
 
     @property
     def searches(self) -> dict[str, SearchFacts]:
@@ -145,9 +146,9 @@ class BatchRun:
         noted["sha256"] = {k: v for k, v in noted["sha256"].items() if k not in found}
         return True
 
-    def _answers(self, todo: Iterable[int]) -> Iterator[Answer]:
-        """Play episodes by the executor."""
-        return run_batch(
+    def _answers(self, todo: Iterable[int], progress: Progress) -> Iterator[Answer]:
+        """Play episodes by the executor; what its processes note is said once."""
+        for answer in run_batch(
             self.prepared,
             self.executor,
             todo,
@@ -155,25 +156,25 @@ class BatchRun:
             searches=self._knowledge.searches,
             ahead=LOOK_AHEAD * self.jobs,
             stopped=self.stopped,
-        )
+        ):
+            if answer.note and not self._noted:
+                self._noted = True
+                progress.say(f"cavsumo: SUMO is started for every episode: {answer.note}")
+            yield answer
 
 
-def _to_retry(
-    csv_file: Path, plan: BatchPlan, learners: frozenset[str]
-) -> tuple[list[int], frozenset[str]]:
+def _to_retry(csv_file: Path, learners: frozenset[str]) -> tuple[list[int], frozenset[str]]:
     """The episodes to play again, and the learners that start anew because they have any.
 
-    Those are all episodes of such a learner, and all that shared a simulation with an error.
+    Those are all episodes of such a learner, and the errors.
     """
     runs: dict[str, list[int]] = {name: [] for name in learners}
-    errors, relearning, last = set(), set(), -1
+    again, relearning = set[int](), set[str]()
     for row in rows_of(csv_file):
-        last = int(row["run"])
         if row["agent"] in learners:
-            runs[row["agent"]].append(last)
+            runs[row["agent"]].append(int(row["run"]))
         if row["outcome"] == "error":
-            errors.add(last // plan.block)
+            again.add(int(row["run"]))
             relearning |= {row["agent"]} & learners
-    again = {run for group in errors for run in range(group * plan.block, (group + 1) * plan.block)}
     again |= {run for name in relearning for run in runs[name]}
-    return sorted(run for run in again if run <= last), frozenset(relearning)
+    return sorted(again), frozenset(relearning)

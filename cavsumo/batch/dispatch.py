@@ -19,7 +19,6 @@ from concurrent.futures import (
     wait,
 )
 from dataclasses import dataclass
-from itertools import groupby
 from typing import Any
 
 from cavsumo.batch.jobs import Job, Memory, failed, job
@@ -72,15 +71,12 @@ def run_batch(
 
 @dataclass
 class _Entry:
-    """Episodes that are played together, from the request to the answer.
+    """An episode, from the request to the answer."""
 
-    One episode, or all episodes that share a simulation, of which only ``wanted`` are returned.
-    """
-
-    wanted: tuple[int, ...]
+    run: int
     agent: str
-    future: Future[list[Answer]] | None = None
-    answers: list[Answer] | None = None
+    future: Future[Answer] | None = None
+    answer: Answer | None = None
 
 
 class _Line:
@@ -96,7 +92,8 @@ class _Line:
     ) -> None:
         self.prepared, self.executor, self.memories = prepared, executor, memories
         self.searches = searches
-        self._coming = self._grouped(todo)
+        agents = tuple(prepared.plan.cast)
+        self._coming = (_Entry(run, agents[run % len(agents)]) for run in todo)
         self.entries: deque[_Entry] = deque()
         self._learners = prepared.cast.learners
 
@@ -106,7 +103,7 @@ class _Line:
             self.entries.append(entry)
         learning = set()
         for entry in self.entries:
-            if entry.answers is None and entry.agent in self._learners:
+            if entry.answer is None and entry.agent in self._learners:
                 if entry.agent in learning:
                     continue  # it can start when it has the memory of the episode before
                 learning.add(entry.agent)
@@ -115,26 +112,26 @@ class _Line:
 
     def advance(self) -> None:
         """Wait a short time for an episode to finish."""
-        waiting = [e for e in self.entries if e.future is not None and e.answers is None]
+        waiting = [e for e in self.entries if e.future is not None and e.answer is None]
         wait([e.future for e in waiting if e.future], POLL_S, return_when=FIRST_COMPLETED)
         for entry in waiting:
             if entry.future is not None and entry.future.done():
-                entry.answers = self._answers(entry, entry.future)
+                entry.answer = self._answer(entry, entry.future)
                 if entry.agent in self._learners:
-                    self.memories[entry.agent] = entry.answers[-1].memory
+                    self.memories[entry.agent] = entry.answer.memory
                 if entry.agent in self.searches:
-                    self.searches[entry.agent].told(entry.answers[-1].outcome.row)
+                    self.searches[entry.agent].told(entry.answer.outcome.row)
 
     def ready(self) -> Iterator[Answer]:
         """The entries to return: all that are finished before the first that is not."""
-        while self.entries and (answers := self.entries[0].answers) is not None:
+        while self.entries and (answer := self.entries[0].answer) is not None:
             self.entries.popleft()
-            yield from answers
+            yield answer
 
     def call_off(self) -> None:
         """Drop the entries that have not started, and all entries after them."""
         for place, entry in enumerate(self.entries):
-            if entry.answers is None and (entry.future is None or entry.future.cancel()):
+            if entry.answer is None and (entry.future is None or entry.future.cancel()):
                 for later in list(self.entries)[place:]:
                     if later.future is not None:
                         later.future.cancel()
@@ -142,36 +139,28 @@ class _Line:
                     self.entries.pop()
                 return
 
-    def _grouped(self, runs: Iterable[int]) -> Iterator[_Entry]:
-        """Episodes that share a simulation together."""
-        block, agents = self.prepared.plan.block, tuple(self.prepared.plan.cast)
-        for _, group in groupby(runs, lambda run: run // block):
-            wanted = tuple(group)
-            yield _Entry(wanted, agents[wanted[0] % len(agents)])
-
     def _known(self, entry: _Entry) -> bool:
         """Whether it is known what an entry is to play, for an agent that searches."""
         search = self.searches.get(entry.agent)
-        return search is None or search.ready(entry.wanted[-1])
+        return search is None or search.ready(entry.run)
 
-    def _jobs(self, entry: _Entry) -> list[Job]:
-        """The jobs of an entry, from the beginning of the simulation that they share."""
-        plan, last = self.prepared.plan, entry.wanted[-1]
+    def _job(self, entry: _Entry) -> Job:
+        """The job of an entry."""
         search = self.searches.get(entry.agent)
-        memory = search.memory(last) if search else self.memories.get(entry.agent)
-        return [job(plan, run, memory) for run in range(last - last % plan.block, last + 1)]
+        memory = search.memory(entry.run) if search else self.memories.get(entry.agent)
+        return job(self.prepared.plan, entry.run, memory)
 
     def _submit(self, entry: _Entry) -> None:
         """Hand an entry to the executor."""
         try:
-            entry.future = self.executor.submit(play, self.prepared, self._jobs(entry))
+            entry.future = self.executor.submit(play, self.prepared, self._job(entry))
         except RuntimeError as error:  # the error of executors that are shut down or broken
             raise BatchError(f"the executor takes no more episodes: {error}") from error
 
-    def _answers(self, entry: _Entry, future: Future[list[Answer]]) -> list[Answer]:
-        """The answers of an entry; episodes lost by the executor are errors."""
+    def _answer(self, entry: _Entry, future: Future[Answer]) -> Answer:
+        """The answer of an entry; an episode lost by the executor is an error."""
         try:
-            answers = future.result()
+            return future.result()
         except (CancelledError, BrokenExecutor, OSError) as error:
             said = f"{type(error).__name__} {error}".strip()
             raise BatchError(f"the executor is gone: {said}") from error
@@ -179,6 +168,5 @@ class _Line:
             raise
         except Exception as error:  # such as dask's KilledWorker
             said = f"the executor lost it: {type(error).__name__}: {error}"
-            plan = self.prepared.plan
-            answers = [Answer(failed(plan, j, said, 0.0), j.memory) for j in self._jobs(entry)]
-        return [answer for answer in answers if answer.outcome.row["run"] in entry.wanted]
+            lost = self._job(entry)
+            return Answer(failed(self.prepared.plan, lost, said, 0.0), lost.memory)

@@ -20,7 +20,6 @@ class Ended:
         reference: the driver that judged the failures, "none" if they were not judged.
         sequential: the number of episodes may depend on what they found, so the intervals must
             hold however it was decided to stop.
-        shared: episodes shared simulations, and those played in a fresh one are found tests.
         cut_short: somebody stopped it.
         searches: by agent, the findings of its search.
         promises: by agent, the class of egos for which its forecasts hold.
@@ -32,7 +31,6 @@ class Ended:
     traces: int = 0
     reference: str = "none"
     sequential: bool = False
-    shared: bool = False
     cut_short: bool = False
     searches: Mapping[str, SearchFacts] = field(default_factory=dict)
     promises: Mapping[str, str] = field(default_factory=dict)

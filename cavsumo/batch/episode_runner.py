@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import itertools
+import hashlib
 import time
 from collections.abc import Callable, Sequence
 from functools import cached_property
@@ -13,17 +13,19 @@ from cavsumo.assertions.base import VIOLATED
 from cavsumo.batch.jobs import Job, Memory, finished
 from cavsumo.batch.messages import Answer
 from cavsumo.batch.prepared import PreparedBatch
-from cavsumo.egos.reference import REFERENCES
-from cavsumo.errors import CavsumoError, EgoError
+from cavsumo.egos.reference import IDEAL, REFERENCES
+from cavsumo.errors import CavsumoError, EgoError, plain
 from cavsumo.model.objects import is_instance
-from cavsumo.model.scenario import Simulation
 from cavsumo.model.seeds import episode_seed
 from cavsumo.results.columns import Row, row_of
+from cavsumo.results.frame_text import frame_lines
 from cavsumo.results.rows import Outcome
-from cavsumo.results.traces import frame, origin, trace_head, trace_text
+from cavsumo.results.trace_file import packed
+from cavsumo.results.traces import origin, trace_head, trace_text
 from cavsumo.simulation.avoidability import AvoidabilityCheck
 from cavsumo.simulation.checkpoints import begun
-from cavsumo.simulation.loop import Episode, EpisodeLoop, played_on
+from cavsumo.simulation.episode import Episode
+from cavsumo.simulation.loop import EpisodeLoop, played_on
 from cavsumo.simulation.playback import played_back, recorded
 from cavsumo.simulation.setup import make_setup
 
@@ -60,19 +62,28 @@ class EpisodeRunner:
                 raise
         for member in self.prepared.cast:
             self._team(member.label)[0][0].prepare()
-        simulation: Simulation = "own" if self.plan.reset == "fresh" else "new"
-        self.setup.world.reset(episode_seed(self.plan.seed, 0), (), (), simulation=simulation)
+        self.setup.world.reset(episode_seed(self.plan.seed, 0), (), ())
 
-    def play(self, job: Job, beat: Callable[[], None] = lambda: None) -> Answer:
-        """Play a job; ``beat`` is called when another simulation begins for it."""
+    def play(
+        self,
+        job: Job,
+        beat: Callable[[], None] = lambda: None,
+        *,
+        judge: bool = True,
+        digest: bool = False,
+    ) -> Answer:
+        """Play a job; ``beat`` is called when another simulation begins for it.
+
+        ``judge``: judge a failure; else nothing is prepared for that, and a failure that would have
+        to be judged is an answer without a trace that says so. ``digest``: with a checksum.
+        """
         since = time.perf_counter()
-        log, checkpoint = "", None
+        log, seen, checkpoint = "", "", None
         try:
             agents = self.agents_of(job)
             before = _recall(agents)
-            own = job.simulation == "own"
-            record = job.record or (self.plan.trace != "none" and own)
-            retry = own and self.plan.reference != "none"
+            record = job.record or self.plan.trace != "none"
+            retry = self.plan.reference != "none"
 
             def check(episode: Episode, kept: EpisodeLoop | None = None) -> AvoidabilityCheck:
                 demand = job.recorded.departures if job.recorded else None
@@ -81,34 +92,41 @@ class EpisodeRunner:
 
             if job.recorded is not None:
                 episode = played_back(self.setup, job.recorded)
+                history = episode.frames
             else:
-                how: dict[str, Any] = {"keep": retry, "simulation": job.simulation}
-                asked, deadline = check if retry else None, self.plan.deadline_s / 2
+                asked = check if retry and judge else None
+                deadline = self.plan.deadline_s / 2
                 loop, checkpoint = begun(
-                    self.setup, agents, job.seed, asked, deadline, record=record, **how
+                    self.setup, agents, job.seed, asked, deadline, record=record, keep=retry
                 )
-                episode = played_on(loop)
+                episode, history = played_on(loop), loop.history
+            seen = hashlib.sha256(repr(history).encode()).hexdigest() if digest else ""
             memory = _recall(agents)
             log = self.setup.ego.take_log()
-            avoidability = None
-            if retry and episode.outcome == VIOLATED:
-                reference = REFERENCES.make(self.plan.reference, {})
+            avoidability, judged = None, True
+            if not judge and retry and episode.outcome == VIOLATED:
+                record = judged = False
+            elif retry and episode.outcome == VIOLATED:
+                reference, ideal = (
+                    REFERENCES.make(name, {}) for name in (self.plan.reference, IDEAL)
+                )
                 if checkpoint is not None:
                     beat()
-                    avoidability = checkpoint.judged(episode, reference)
-                avoidability = avoidability or check(episode).judged(reference)
+                    avoidability = checkpoint.judged(episode, reference, ideal)
+                avoidability = avoidability or check(episode).judged(reference, ideal)
             row = row_of(finished(self.plan, job, episode, avoidability))
-            trace = self._trace(job, row, before, episode) if record else ""
+            trace = self._trace(job, row, before, episode) if record else b""
         except Exception as error:  # any error costs this row and no other
-            said = str(error) if isinstance(error, CavsumoError) else f"defect: {error!r}"
-            row, trace = row_of(finished(self.plan, job, error=said)), ""
-            memory = job.memory
+            known = isinstance(error, CavsumoError | OSError)
+            said = plain(error) if known else f"defect: {error!r}"
+            row, trace = row_of(finished(self.plan, job, error=said)), b""
+            memory, judged = job.memory, True
         finally:
             if checkpoint is not None:
                 checkpoint.close()
         row["wall_s"] = time.perf_counter() - since
         said_later = self.setup.ego.take_log()  # of an episode that failed; a rerun's is not kept
-        return Answer(Outcome(row, trace, log or said_later), memory)
+        return Answer(Outcome(row, trace, log or said_later), memory, judged, seen)
 
     def _team(self, label: str) -> tuple[list[Agent], Memory | None]:
         """The agents of a label, and their knowledge when they were built; fresh copies of an agent
@@ -128,14 +146,13 @@ class EpisodeRunner:
             agent.remember(memory)
         return agents
 
-    def _trace(self, job: Job, row: Row, memory: Any, episode: Episode) -> str:
-        """The frames worth keeping: of tests found, or of every episode if asked."""
+    def _trace(self, job: Job, row: Row, memory: Any, episode: Episode) -> bytes:
+        """The trace, if it is worth keeping: of tests found, or of every episode if asked."""
         if not (episode.frames and (job.record or episode.judgement.triggered)):
-            return ""
+            return b""
         played = recorded(self.setup, episode, job.seed, episode.departures)
         first = trace_head(self._origin, row, memory, episode.frames, played)
-        frames = itertools.zip_longest(episode.frames, played.actions, fillvalue=())
-        return trace_text(first, itertools.starmap(frame, frames))
+        return packed(trace_text(first, frame_lines(episode.frames, played.actions)))
 
 
 def _recall(agents: Sequence[Agent]) -> Memory | None:

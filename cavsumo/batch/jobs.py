@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from cavsumo.agents.recorded import Recorded
 from cavsumo.model.labels import labelled
-from cavsumo.model.scenario import BatchPlan, Simulation
+from cavsumo.model.scenario import BatchPlan
 from cavsumo.model.seeds import episode_seed
 from cavsumo.results.column import FinishedEpisode
 from cavsumo.results.columns import row_of
@@ -18,7 +18,7 @@ from cavsumo.results.rows import Outcome
 
 if TYPE_CHECKING:
     from cavsumo.simulation.avoidability import Avoidability
-    from cavsumo.simulation.loop import Episode
+    from cavsumo.simulation.episode import Episode
 
 Memory = tuple[Any, ...]  # the knowledge of an episode's agents, as plain data, agent by agent
 
@@ -33,7 +33,6 @@ class Job:
         seed: the episode's seed.
         memory: the agents' knowledge from earlier episodes; None for none.
         record: keep the frames in any case.
-        simulation: "own", or "new" to start one that later jobs share as the "same".
         recorded: an episode to play back instead of asking the agents; None to ask them.
     """
 
@@ -42,7 +41,6 @@ class Job:
     seed: int
     memory: Memory | None = None
     record: bool = False
-    simulation: Simulation = "own"
     recorded: Recorded | None = None
 
 
@@ -65,8 +63,7 @@ def finished(
     error: str = "",
 ) -> FinishedEpisode:
     """A job with its result: an episode, or the reason why there is none."""
-    fresh = job.simulation == "own"
-    return FinishedEpisode(plan, job.run, job.agent, job.seed, fresh, episode, avoidability, error)
+    return FinishedEpisode(plan, job.run, job.agent, job.seed, episode, avoidability, error)
 
 
 def failed(plan: BatchPlan, job: Job, message: str, wall: float) -> Outcome:

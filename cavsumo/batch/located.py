@@ -6,7 +6,7 @@ import dataclasses
 from pathlib import Path
 
 from cavsumo.batch.replay import Record
-from cavsumo.model.named_networks import check_network, network_file
+from cavsumo.model.named_networks import check_network, named_routes, network_file, routes_file
 from cavsumo.results.present import present_paths
 
 PLAYED_BACK = ", or play back who departed with --playback"
@@ -18,7 +18,7 @@ def located(
     """The record with the present paths of its files.
 
     Args:
-        net, routes: where the network and the routes are; a network with a name is found by it.
+        net, routes: where the network and the routes are; cavsumo's are found by their names.
         shown: the episode is not played, so that the network is enough.
 
     Raises InputError for a missing or different file.
@@ -29,7 +29,7 @@ def located(
         check_network(net, "--net")
         given[str(scenario.net)] = network_file(net)
     if routes is not None:
-        given[str(scenario.routes)] = routes
+        given[str(scenario.routes)] = routes_file(named_routes(routes, "--routes"))
     names = [str(scenario.net)] if shown else None
     way_out = PLAYED_BACK if record.trace is not None and record.trace.has_recording else ""
     places = present_paths(plan, record.origin, record.file, names, given=given, way_out=way_out)

@@ -2,27 +2,28 @@
 
 from __future__ import annotations
 
-import heapq
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from cavsumo.batch.ended import Ended
+from cavsumo.batch.merge_parts import check_rows, in_order, outcome_of
 from cavsumo.batch.preflight import check_kept
 from cavsumo.batch.prepared import OUTPUTS
 from cavsumo.batch.tally import Tally
 from cavsumo.errors import InputError, ResultsError
-from cavsumo.model.documents import read_text
 from cavsumo.results.present import input_files, present_paths
 from cavsumo.results.provenance import differences
-from cavsumo.results.reading import check_apart, check_cells, ego_log_name, inside, whole_lines
+from cavsumo.results.reading import check_apart
 from cavsumo.results.recorded_plan import recorded_plan
-from cavsumo.results.rows import Outcome
 from cavsumo.results.writing import Recorder
 
-SHOWN = 5  # missing episodes that are named
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
+LARGE = 8 << 20  # bytes from which parts are worth the import of pandas, which takes 0.4 s
 APART = frozenset({"shard", "deadline_s", "budget_s"})  # settings in which parts may differ
-Numbered = tuple[int, int, dict[str, str]]  # run, which part, row
 
 
 def merged(
@@ -38,7 +39,10 @@ def merged(
     """
     check_apart(output, parts)
     whole = _whole_manifest(parts)
-    _check_whole(parts, whole)
+    total = whole["plan"]["runs"] * len(whole["plan"]["agents"])
+    owners = _owners(parts, total)
+    if owners is None:
+        check_rows(parts, total)
     if not overwrite:
         check_kept(output, whole)
     inputs = _inputs(parts, warn)
@@ -46,9 +50,13 @@ def merged(
     with Recorder(output) as recorder:
         recorder.begin(whole, overwrite=overwrite)
         recorder.keep(inputs)
-        for run, part, row in _in_order(parts):
-            files = _trace_of(parts[part], row), _log_of(parts[part], run)
-            tally.add(recorder.write(Outcome(row | {"run": run}, *files)))
+        if owners is None:
+            for run, part, row in in_order(parts):
+                tally.add(recorder.write(outcome_of(parts[part], run, row)))
+        else:
+            from cavsumo.batch.merge_large import copy
+
+            copy(parts, owners, recorder, tally)
         facts = tally.facts()
         recorder.finish("finished", facts)
     return Ended("", output, tally, recorder.traces, str(whole["plan"].get("reference", "none")))
@@ -98,56 +106,10 @@ def _inputs(parts: Sequence[Path], warn: Callable[[str], None]) -> dict[str, Pat
     return found
 
 
-def _check_whole(parts: Sequence[Path], whole: dict[str, Any]) -> None:
-    """Every episode must be there, once."""
-    total = whole["plan"]["runs"] * len(whole["plan"]["agents"])
-    missing: list[int] = []
-    expected = owner = 0
-    for run, part, row in _in_order(parts):
-        if run < expected:
-            there = " and in ".join(repr(str(parts[i])) for i in sorted({owner, part}))
-            raise ResultsError(f"run {run} is there twice, in {there}")
-        if run >= total:
-            raise ResultsError(f"{str(parts[part])!r}: run {run} of a batch of {total} episodes")
-        missing += range(expected, min(run, expected + SHOWN))
-        _trace_of(parts[part], row)
-        _log_of(parts[part], run)
-        expected, owner = run + 1, part
-    missing += range(expected, min(total, expected + SHOWN))
-    if missing:
-        some = ", ".join(map(str, missing[:SHOWN]))
-        more = ", ..." if len(missing) > SHOWN else ""
-        raise ResultsError(f"the parts have gaps: no run {some}{more} of {total} episodes")
+def _owners(parts: Sequence[Path], total: int) -> NDArray[np.intp] | None:
+    """The part of each run where large parts are a whole; None to read them row by row."""
+    if sum(part.stat().st_size for part in parts if part.is_file()) < LARGE:
+        return None
+    from cavsumo.batch.merge_large import owners  # which imports pandas
 
-
-def _in_order(parts: Sequence[Path]) -> Iterator[Numbered]:
-    """The rows of all parts by their numbers."""
-    return heapq.merge(*(_numbered(part, i) for i, part in enumerate(parts)), key=lambda n: n[:2])
-
-
-def _numbered(part: Path, index: int) -> Iterator[Numbered]:
-    """The rows of one part, which must ascend."""
-    last = -1
-    for _, row in whole_lines(part):
-        if row is not None:
-            run = int(row["run"])
-            check_cells(part, row)
-            if run <= last:
-                raise ResultsError(f"results {str(part)!r}: run {run} stands behind run {last}")
-            last = run
-            yield run, index, row
-
-
-def _trace_of(part: Path, row: dict[str, str]) -> str:
-    """The trace of a row, empty for none."""
-    if not row["trace"]:
-        return ""
-    what = f"results {str(part)!r}: trace of run {row['run']}"
-    return read_text(inside(part, row["trace"]), what, ResultsError)
-
-
-def _log_of(part: Path, run: int) -> str:
-    """The ego's output in an episode, empty for none."""
-    file = inside(part, ego_log_name(part, run))
-    what = f"results {str(part)!r}: ego's output in run {run}"
-    return read_text(file, what, ResultsError) if file.exists() else ""
+    return owners(parts, total)

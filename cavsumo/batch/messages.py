@@ -1,6 +1,6 @@
 """The messages to a simulating process and back: a task and a reply.
 
-Each is pickled once. A row and the text of a trace are made in the simulating process and pass
+Each is pickled once. A row and the bytes of a trace are made in the simulating process and pass
 unchanged into the files; ``PreparedBatch`` packs the batch.
 """
 
@@ -38,10 +38,17 @@ class Answer:
     Attributes:
         outcome: its row, trace and log.
         memory: the knowledge of its agents afterwards; None if none of them learns.
+        judged: False for a failure that has yet to be judged (``EpisodeRunner.play``).
+        digest: a checksum of all its snapshots, where that was asked for.
+        note: why SUMO is started for every episode although the network is large; empty if it is
+            not, or if that was said before.
     """
 
     outcome: Outcome
     memory: Memory | None = None
+    judged: bool = True
+    digest: str = ""
+    note: str = ""
 
 
 @dataclass(frozen=True)

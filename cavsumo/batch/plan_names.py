@@ -2,19 +2,21 @@
 
 from __future__ import annotations
 
-from cavsumo.agents.names import AGENT_NAMES, policy_file
+from cavsumo.agents.names import AGENT_NAMES, declared_parameters, policy_file
 from cavsumo.assertions.formulas.rules import rule
 from cavsumo.assertions.names import ASSERTION_NAMES, is_formula
-from cavsumo.egos.names import EGO_NAMES
+from cavsumo.egos.names import check_ego
 from cavsumo.egos.reference.names import REFERENCE_NAMES
 from cavsumo.errors import InputError, UnknownName
 from cavsumo.model.bodies import kind_named
+from cavsumo.model.names import check_shared
 from cavsumo.model.objects import is_object
-from cavsumo.model.scenario import NO_REFERENCE, BatchPlan
+from cavsumo.model.scenario import NO_REFERENCE, BatchPlan, Scenario
 
 
 def check_names(plan: BatchPlan) -> None:
-    """Raise UnknownName, with the nearest name, for an unknown name, signals of formulas included.
+    """Raise UnknownName, with the nearest name, for an unknown name, those of parameters and of
+    signals in formulas included.
 
     Names with a colon (``module:Class``) are resolved later, when they are built; so are formulas
     in place of a name.
@@ -22,8 +24,8 @@ def check_names(plan: BatchPlan) -> None:
     scenario = plan.scenario
     for name in plan.cast.values():
         _check_agent(name)
-    if ":" not in scenario.ego:
-        EGO_NAMES.check(scenario.ego)
+    _check_agent_params(plan)
+    check_ego(scenario.ego, scenario.ego_params)
     kind_named(scenario.kind)
     if plan.reference != NO_REFERENCE and plan.reference not in REFERENCE_NAMES:
         valid = {NO_REFERENCE, *REFERENCE_NAMES}
@@ -34,6 +36,26 @@ def check_names(plan: BatchPlan) -> None:
     for name in scenario.assertions:
         if name not in known and ":" not in name and not is_formula(name):
             raise UnknownName(ASSERTION_NAMES.sort, name, known)
+    _check_assertion_params(scenario)
+
+
+def _check_agent_params(plan: BatchPlan) -> None:
+    """Refuse parameters that no agent has; those of a user's agent are known when it is built."""
+    known = {label: declared_parameters(name) for label, name in plan.cast.items()}
+    declared = {label: own for label, own in known.items() if own is not None}
+    if len(declared) == len(known):
+        check_shared(plan.params, declared, f"agent {' '.join(plan.agents)}")
+
+
+def _check_assertion_params(scenario: Scenario) -> None:
+    """Refuse parameters that no assertion has, as those of agents; formulas have none."""
+    known = {
+        name: () if name in scenario.formulas else ASSERTION_NAMES.parameters(name)
+        for name in scenario.assertions
+    }
+    declared = {name: own for name, own in known.items() if own is not None}
+    if len(declared) == len(known):
+        check_shared(scenario.assertion_params, declared, f"assertion {' '.join(known)}")
 
 
 def _check_agent(name: str) -> None:

@@ -14,9 +14,10 @@ from cavsumo.batch.manner import Manner
 from cavsumo.batch.plan_names import check_names
 from cavsumo.errors import InputError, ResultsError
 from cavsumo.model.scenario import BatchPlan, plan_from
+from cavsumo.model.scenario.gone import without_gone
 from cavsumo.model.study import Part
 from cavsumo.network.network_file import root_of
-from cavsumo.results.present import input_files, present_paths
+from cavsumo.results.present import gone, present_paths
 from cavsumo.results.reading import check_replaceable, read_manifest
 from cavsumo.results.writing import check_free
 
@@ -97,7 +98,7 @@ def _recorded(output: Path, manner: Manner) -> dict[str, Any] | None:
 
 
 def _moved(recorded: Mapping[str, Any] | None, output: Path) -> dict[str, Path]:
-    """The present paths of the files of a batch to go on with, where none is at its place.
+    """The present paths of the files of a batch to go on with, where none can be read at its place.
 
     A file that was changed there since is none to go on with, so no other one is searched.
     """
@@ -105,8 +106,7 @@ def _moved(recorded: Mapping[str, Any] | None, output: Path) -> dict[str, Path]:
         plan = BatchPlan.model_validate((recorded or {})["plan"])
     except (KeyError, ValueError):  # a new batch, or none to go on with
         return {}
-    gone = [name for name, was in input_files(plan).items() if not was.is_file()]
-    return present_paths(plan, recorded or {}, output, gone)
+    return present_paths(plan, recorded or {}, output, gone(plan))
 
 
 def recorded_settings(recorded: Mapping[str, Any] | None) -> dict[str, Any]:
@@ -114,7 +114,7 @@ def recorded_settings(recorded: Mapping[str, Any] | None) -> dict[str, Any]:
     if recorded is None:
         return {}
     try:
-        plan = dict(recorded["plan"])
+        plan = without_gone(recorded["plan"])
         flat = {"routes": "none"} | {k: v for k, v in plan.pop("scenario").items() if v is not None}
         return flat | {k: v for k, v in plan.items() if v is not None}
     except (KeyError, TypeError, ValueError, AttributeError) as error:

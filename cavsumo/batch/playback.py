@@ -13,12 +13,13 @@ from cavsumo.batch.worker import Worker
 from cavsumo.errors import InputError, ResultsError
 from cavsumo.model.bodies import Action
 from cavsumo.model.scenario import BatchPlan
-from cavsumo.results.traces import Trace, parsed
+from cavsumo.results.present import input_files
+from cavsumo.results.traces import Trace, trace_of
 
 # Columns of which the agents and the reruns decide, so that a playback does not reproduce them.
 NOT_PLAYED_BACK = frozenset(
     {"agent", "forecast", "forecast_value"}
-    | {"avoidable", "reference", "last_chance_s", "margin_s", "avoidable_note"}
+    | {"avoidable", "avoidable_ideal", "reference", "last_chance_s", "margin_s", "avoidable_note"}
 )
 AGAIN = "playback"  # label of the agent in a plan that is played back
 
@@ -61,17 +62,15 @@ def _between_frames(trace: Trace, plan: BatchPlan) -> list[list[Action]]:
 
 
 def for_playback(record: Record) -> Record:
-    """A record as it is played back: with its recorded departures it needs no demand.
+    """A record as it is played back: without its agent's files, and without a demand if who
+    departed is recorded.
 
     Raises InputError when it holds no actions.
     """
     recorded, scenario = _recording(record), record.plan.scenario
     changed: dict[str, Any] = {"approaches": tuple(recorded.approaches)}
-    sums = dict(record.origin.get("sha256") or {})
     if recorded.departures is not None:
         changed |= {"routes": None, "traffic": None}
-        for name in ("traffic", str(scenario.routes)):
-            sums.pop(name, None)
     plan = record.plan.model_copy(
         update={
             "scenario": scenario.model_copy(update=changed),
@@ -81,13 +80,17 @@ def for_playback(record: Record) -> Record:
             "reference": "none",
         }
     )
-    return dataclasses.replace(record, plan=plan, origin={**record.origin, "sha256": sums})
+    unused = input_files(record.plan).keys() - input_files(plan).keys()
+    unused |= {"traffic"} if recorded.departures is not None else set()
+    sums = dict(record.origin.get("sha256") or {})
+    kept = {name: sha for name, sha in sums.items() if name not in unused}
+    return dataclasses.replace(record, plan=plan, origin={**record.origin, "sha256": kept})
 
 
 def played_back(worker: Worker, record: Record) -> Replayed:
     """An episode played back by a worker of its plan; the record is that of ``for_playback``."""
     outcome = worker.play(playback_job(record)).outcome
-    return Replayed(outcome.row, parsed(outcome.trace) if outcome.trace else None)
+    return Replayed(outcome.row, trace_of(outcome))
 
 
 def playback_job(record: Record) -> Job:

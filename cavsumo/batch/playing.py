@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import Executor
 
 from cavsumo.batch.batch_run import BatchRun
@@ -19,7 +19,9 @@ from cavsumo.egos.ego_files import OutputWatch
 from cavsumo.errors import CavsumoError, InputError
 from cavsumo.results.inputs import TOO_LARGE
 from cavsumo.results.writing import Recorder
+from cavsumo.sumo.references import references
 
+SHOWN = 3  # names of files in a message
 Announce = Callable[[CheckedBatch, int], None]  # a batch, and the jobs at a time
 
 
@@ -79,8 +81,9 @@ def _play(
             batch_run.resume({**batch.recorded, "plan": batch.manifest["plan"]})
         if not manner.quiet:
             announce(batch, jobs)
-        for file in batch_run.left_out:
-            print(f"cavsumo: {str(file)!r} {TOO_LARGE}", file=sys.stderr)
+        too_large = (f"{str(file)!r} {TOO_LARGE}" for file in batch_run.left_out)
+        for said in (*too_large, *_apart(prepared)):
+            print(f"cavsumo: {said}", file=sys.stderr)
         _carry_out(batch_run, manner)
     return Ended(
         batch.name,
@@ -89,11 +92,23 @@ def _play(
         recorder.traces,
         prepared.plan.reference,
         sequential=looks_at_rows(prepared.plan),
-        shared=prepared.plan.reset == "shared",
         cut_short=batch_run.cut_short or batch_run.status == "interrupted",
         searches=batch_run.searches,
         promises={member.label: member.promise for member in prepared.cast},
     )
+
+
+def _apart(prepared: PreparedBatch) -> Iterator[str]:
+    """Sentences about files that SUMO reads and that are not kept."""
+    scenario = prepared.plan.scenario
+    routes = [] if scenario.routes_file is None else [scenario.routes_file]
+    for file in (*routes, *scenario.additional_files):
+        if names := references(file):
+            them = ", ".join(map(repr, names[:SHOWN])) + (", ..." if names[SHOWN:] else "")
+            yield (
+                f"{file.name!r} has SUMO read {them}, which the results do not keep: a replay "
+                "elsewhere needs both beside them"
+            )
 
 
 def _carry_out(batch_run: BatchRun, manner: Manner) -> None:

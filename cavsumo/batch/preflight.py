@@ -120,6 +120,10 @@ def _checked(batch: PlannedBatch) -> CheckedBatch:
     different = [] if recorded is None else list(differences(recorded, now))
     if different:
         raise ResultsError(f"results {str(output)!r} are of another batch: {'; '.join(different)}")
+    for label, learned in (recorded or {}).get("learned", {}).items():
+        if label in prepared.cast.learners:
+            source = f"manifest of {str(output)!r}: learned"
+            prepared.cast.check_memory(label, learned, source)
     return CheckedBatch(batch.name, output, prepared, now, recorded)
 
 

@@ -26,15 +26,17 @@ from cavsumo.errors import InputError
 from cavsumo.model.bodies import WALKING, Kind, kind_named
 from cavsumo.model.objects import SentObject, objects_among
 from cavsumo.model.scenario import BatchPlan, Scenario
-from cavsumo.network.site import Site, Wishes, derive_site
+from cavsumo.model.visible_files import is_visible
+from cavsumo.network.site import Site, Wishes
+from cavsumo.network.site_cache import site_of
 from cavsumo.network.traffic import Volume
 from cavsumo.network.traffic_lights import Pace
 from cavsumo.results.present import input_files
 from cavsumo.results.provenance import checksums, traffic_checksum, unequal, versions
 from cavsumo.search.space import space_of
-from cavsumo.sumo.demand import BEYOND_S
 from cavsumo.sumo.options import OPTIONS
 
+BEYOND_S = 60.0  # how far beyond the horizon there must be demand, for waits and overtime
 OUTPUTS = "ego_outputs"  # in a manifest: the files of its command that an ego wrote
 
 
@@ -85,12 +87,23 @@ class PreparedBatch:
 
         Files that the ego may have written since are not inputs (``ego_files``).
         """
+        self._check_copies()
         found = {**versions(), **checksums(self.plan.scenario, self.cast.files)}
         free = self._written_here()
         for name, (there, here) in unequal({**self.versions, **self.checksums}, found):
             if name in free or (there is None and name not in self.versions):
                 continue
             raise InputError(f"{name} is {here} in the process that simulates, expected {there}")
+
+    def _check_copies(self) -> None:
+        """Refuse copies of moved files that this process does not see, such as a dask worker's."""
+        for name, place in self.plan.scenario.places.items():
+            if not is_visible(place):
+                raise InputError(
+                    f"{name!r} is not at {str(place)!r} for the process that simulates: it was "
+                    "unpacked from the results for this machine alone; put the file where it was, "
+                    "where all processes see it"
+                )
 
     def _written_here(self) -> set[str]:
         """The files of the ego that may have changed on this machine."""
@@ -121,14 +134,14 @@ def prepare(plan: BatchPlan, ego: Ego | None = None) -> PreparedBatch:
     cast = resolve_cast(plan)
     for member in cast:
         member.make().prepare()
+        cast.check_memory(member.label, (plan.known or {}).get(member.label), "known")
     assertions_of(scenario)
     kind = kind_named(scenario.kind)
     _check_kind(scenario, kind, cast)
-    if cast.learners and (plan.shard or plan.reset == "shared"):
-        what = f"shard {plan.shard}" if plan.shard else "reset shared"
+    if cast.learners and plan.shard:
         raise InputError(
-            f"{what}: {' and '.join(sorted(cast.learners))} learns from episode to episode, in "
-            "sequence; learn=false plays what was learned"
+            f"shard {plan.shard}: {' and '.join(sorted(cast.learners))} learns from episode to "
+            "episode, in sequence; learn=false plays what was learned"
         )
     if cast.searchers and plan.shard:
         raise InputError(
@@ -142,7 +155,7 @@ def prepare(plan: BatchPlan, ego: Ego | None = None) -> PreparedBatch:
             "needs a controller, such as time-gap"
         )
     asked = wishes(plan, kind, ego, {member.manoeuvre for member in cast})
-    site = derive_site(scenario.net_file, scenario.ego_route, scenario.junction, ego.kind, asked)
+    site = site_of(scenario.net_file, scenario.ego_route, scenario.junction, ego.kind, asked)
     if scenario.embodiment == "person" and not all(area.walk for area in site.areas):
         raise InputError("jaywalk: embodiment person needs a pavement near by, and there is none")
     if site.approaches:  # missing room must be found before the first episode

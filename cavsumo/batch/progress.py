@@ -26,7 +26,7 @@ class Progress:
 
     def __init__(self, total: int, quiet: bool, done: int = 0) -> None:
         self.total, self.done, self.before = total, done, done
-        self._begun = time.monotonic()
+        self._begun, self._quiet = time.monotonic(), quiet
         terminal = sys.stderr.isatty()
         self._notebook = None if quiet or not in_notebook() else _NotebookBar()
         self._lines = not (quiet or terminal or self._notebook)
@@ -50,6 +50,11 @@ class Progress:
         self._bar.stop()
         if self._notebook is not None:
             self._notebook.clear()
+
+    def say(self, line: str) -> None:
+        """Print a line beside the progress, unless that is not shown."""
+        if not self._quiet:
+            self._bar.console.print(line, markup=False, highlight=False, soft_wrap=True)
 
     def update(self, tally: Tally) -> None:
         """One more episode was played."""

@@ -14,7 +14,7 @@ from cavsumo.batch.messages import Answer
 from cavsumo.batch.prepared import PreparedBatch, prepare
 from cavsumo.batch.searching import searched
 from cavsumo.batch.trust import check_trust
-from cavsumo.batch.worker import Worker, search
+from cavsumo.batch.worker import Worker
 from cavsumo.errors import DivergenceError, ResultsError, shown
 from cavsumo.model.bodies import STEERING, THROTTLE
 from cavsumo.model.scenario import BatchPlan
@@ -22,7 +22,7 @@ from cavsumo.results.columns import COLUMNS, Row
 from cavsumo.results.reading import check_cells, inside, rows_of
 from cavsumo.results.recorded_plan import plan_in, recorded_plan
 from cavsumo.results.rows import cell
-from cavsumo.results.traces import NOT_REPLAYED, Trace, parsed, read_trace
+from cavsumo.results.traces import NOT_REPLAYED, Trace, read_trace, trace_of
 
 
 @dataclass(frozen=True)
@@ -111,8 +111,8 @@ def recorded_alone(
         raise ResultsError(f"{name}: its plan has no agent {shown(row['agent'])}")
     if row["reset"] == "shared":
         raise ResultsError(
-            f"{name}: was played in a simulation that other episodes used before; replay it from "
-            "its results"
+            f"{name}: was played in a simulation that other episodes had used before, and is not "
+            "played so any more"
         )
     if anew and not kept:
         raise ResultsError(
@@ -135,10 +135,10 @@ def replayed(worker: Worker, record: Record) -> Replayed:
     """An episode once more, after the earlier episodes on which it depends.
 
     Learners first play their earlier episodes, or get their knowledge from the trace if it stands
-    alone; an episode of a shared simulation comes after those before it.
+    alone.
     """
     outcome = _played_again(worker, record).outcome
-    return Replayed(outcome.row, parsed(outcome.trace) if outcome.trace else None)
+    return Replayed(outcome.row, trace_of(outcome))
 
 
 def _played_again(worker: Worker, record: Record) -> Answer:
@@ -146,11 +146,10 @@ def _played_again(worker: Worker, record: Record) -> Answer:
     plan, run = worker.prepared.plan, record.run
     if record.alone and record.trace is not None:
         row, memory = record.row, record.trace.head["memory"]
+        source = f"trace {str(record.file)!r}: memory"
+        worker.prepared.cast.check_memory(row["agent"], memory, source)
         again = Job(run, row["agent"], int(row["seed"]), memory, record=True)
         return worker.play(again)
-    if record.row["reset"] == "shared":
-        first = run - run % plan.block
-        return search(worker, [job(plan, i) for i in range(first, run + 1)])[-1]
     return worker.play(dataclasses.replace(job(plan, run, known(worker, record)), record=True))
 
 

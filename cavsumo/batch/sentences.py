@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from cavsumo.batch.searching import SearchFacts
 from cavsumo.batch.tally import Found, Row
-from cavsumo.egos.reference import REFERENCES
+from cavsumo.egos.reference import IDEAL, REFERENCES
 from cavsumo.results.failures import NOT_JUDGED, UNPREVENTABLE
 from cavsumo.results.rows import cell, is_failure
 from cavsumo.results.statistics import rate
@@ -33,10 +33,29 @@ def judgement(found: Found, reference: str) -> str:
     """The driver that would have prevented failures, and the others apart; empty without any."""
     if not found.failures:
         return ""
-    others = ((found.unpreventable, UNPREVENTABLE), (found.not_judged, NOT_JUDGED))
-    apart = ", ".join(f"{count} {kind}" for count, kind in others if count)
     said = f"{many(found.preventable, 'failure')} preventable by {driver(reference)}"
-    return f"{said}; apart from that {apart}" if apart else said
+    ideal = by_ideal(found, reference)
+    return f"{said}{others(found.unpreventable, found.not_judged, ideal)}"
+
+
+def by_ideal(found: Found, reference: str) -> int | None:
+    """How many failures an ideal driver would have avoided and the reference driver would not.
+
+    None where that was not judged, or the reference is the ideal driver.
+    """
+    asked = found.ideal.total() > 0 and reference != IDEAL
+    return found.ideal[True] if asked else None
+
+
+def others(unpreventable: int, not_judged: int, ideal: int | None) -> str:
+    """The failures that are not preventable, as the end of a sentence; empty without any.
+
+    ``ideal``: ``by_ideal``.
+    """
+    kinds = ((unpreventable, UNPREVENTABLE), (not_judged, NOT_JUDGED))
+    apart = ", ".join(f"{count} {kind}" for count, kind in kinds if count)
+    said = f"; apart from that {apart}" if apart else ""
+    return said if ideal is None else f"{said}; {driver(IDEAL)} would have avoided {ideal} more"
 
 
 def exit_reason(found: Found, judged: bool) -> str:

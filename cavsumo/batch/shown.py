@@ -11,7 +11,8 @@ from cavsumo.egos.base import EGO_KIND
 from cavsumo.errors import ResultsError
 from cavsumo.model.bodies import Kind, kind_named
 from cavsumo.model.scenario import BatchPlan, Scenario
-from cavsumo.network.site import Site, Wishes, derive_site
+from cavsumo.network.site import Site, Wishes
+from cavsumo.network.site_cache import site_of
 from cavsumo.results.traces import Trace
 
 
@@ -30,7 +31,7 @@ def shown_site(plan: BatchPlan, trace: Trace | None) -> Site:
     types = approach_types(scenario, kind, shown_manoeuvres(plan))
     wishes = Wishes(kind=kind, types=types, jaywalk=scenario.jaywalk)
     ego = _ego_kind(scenario, trace)
-    return derive_site(scenario.net_file, scenario.ego_route, scenario.junction, ego, wishes)
+    return site_of(scenario.net_file, scenario.ego_route, scenario.junction, ego, wishes)
 
 
 def _ego_kind(scenario: Scenario, trace: Trace | None) -> Kind:

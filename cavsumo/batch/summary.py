@@ -36,7 +36,6 @@ def summarise(ended: Sequence[Ended]) -> None:
     if any(one.sequential for one in ended):
         _say(console, "intervals: beta-binomial confidence sequences, valid whenever one stops")
     together = found_by(found for one in ended for found in one.tally.agents.values())
-    _say_shared(ended, console)
     rows = sum(one.tally.rows for one in ended)
     tests, episodes = sentences.many(together.tests, "test"), sentences.many(rows, "episode")
     failed = sentences.failures(together, _judged(ended))
@@ -122,19 +121,6 @@ def result_files(ended: Ended) -> str:
         traces = sentences.many(ended.traces, "trace")
         files += f", {ended.csv_file.with_suffix('')}/ ({traces})"
     return files
-
-
-def _say_shared(ended: Sequence[Ended], console: Console) -> None:
-    """The number of tests from shared simulations that did not occur again."""
-    found = [one.tally.all for one in ended if one.shared]
-    fresh, tests = sum(one.fresh for one in found), sum(one.tests for one in found)
-    if fresh:
-        lost = fresh - tests
-        _say(
-            console,
-            f"\n{fresh} tests found in shared simulations and played again in fresh ones: "
-            f"{lost} ({percent(lost / fresh)}) did not come out as tests again",
-        )
 
 
 def _say_invalid(ended: Sequence[Ended], console: Console) -> None:

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
+from itertools import compress, islice
 from typing import TYPE_CHECKING, Any
 
 from cavsumo.assertions.base import HELD, INVALID, UNFAIR, VIOLATED
@@ -16,7 +17,18 @@ if TYPE_CHECKING:
     from cavsumo.results.kaplan_meier import Curve
 
 Row = Mapping[str, Any]
+Columns = Mapping[str, Sequence[Any]]  # cells by column, one each row
+AT_ONCE = 10_000  # rows that are in memory while they are counted
 RATES = ("tests", "preventable", "failures")
+ERROR, TESTS = "error", (HELD, VIOLATED)
+JUDGED = ("avoidable", "avoidable_ideal")
+DRIVES = ("arrived", "lost_s", "frozen")
+KINDS = ("outcome", "avoidable", "frozen")  # columns that say what a row can be the first of
+# Columns that are counted.
+COUNTED = (
+    *("agent", "outcome", "verdicts", "forecast", "trigger_time_s", "time_s"),
+    *(*JUDGED, *DRIVES),
+)
 
 
 @dataclass
@@ -25,11 +37,12 @@ class Found:
 
     Attributes:
         outcomes: the number of episodes with each outcome.
-        fresh: the number of rows of episodes in a simulation of their own.
         times: when tests were triggered, by time [s] to three decimals.
         censored: when valid episodes without a test ended, likewise.
         verdicts: for each assertion, how often it said what.
         kinds: failures by ``failures.failure_kind``.
+        ideal: of the unpreventable ones, how many the ideal driver would have avoided (True) or
+            not, as far as it was asked.
         arrivals: in how many episodes that no verdict ended the ego arrived (True) or not.
         lost_s, compared: time lost against the free drive [s], and in how many episodes.
         frozen: how often the ego stood still or crawled, by the column's word.
@@ -37,16 +50,55 @@ class Found:
     """
 
     outcomes: Counter[str] = field(default_factory=Counter)
-    fresh: int = 0
     times: Counter[float] = field(default_factory=Counter)
     censored: Counter[float] = field(default_factory=Counter)
     verdicts: dict[str, Counter[str]] = field(default_factory=dict)
     kinds: Counter[str] = field(default_factory=Counter)
+    ideal: Counter[bool] = field(default_factory=Counter)
     arrivals: Counter[bool] = field(default_factory=Counter)
     lost_s: float = 0.0
     compared: int = 0
     frozen: Counter[str] = field(default_factory=Counter)
     forecasts: dict[str, Counter[bool]] = field(default_factory=dict)
+
+    def count(self, columns: Columns) -> None:
+        """Count rows given by columns, all of ``COUNTED``, as made, as read or as numbers."""
+        outcomes = columns["outcome"]
+        self.outcomes.update(outcomes)
+        for said, count in Counter(columns["verdicts"]).items():
+            for name, verdict in verdicts_of({"verdicts": said}).items():
+                self.verdicts.setdefault(name, Counter())[verdict] += count
+        tests = [outcome in TESTS for outcome in outcomes]
+        for (said, test), count in Counter(zip(columns["forecast"], tests, strict=True)).items():
+            if said:
+                self.forecasts.setdefault(said, Counter())[test] += count
+        self.times.update(_times(compress(columns["trigger_time_s"], tests)))
+        ended = [outcome not in (*TESTS, ERROR, INVALID) for outcome in outcomes]
+        self.censored.update(_times(compress(columns["time_s"], ended)))
+        self._count_failures(columns)
+        self._count_drives(columns, [test or end for test, end in zip(tests, ended, strict=True)])
+
+    def _count_failures(self, columns: Columns) -> None:
+        """Count failures by who would have avoided them."""
+        failed = [outcome == VIOLATED for outcome in columns["outcome"]]
+        judged = (map(cell, compress(columns[name], failed)) for name in JUDGED)
+        for (avoidable, ideal), count in Counter(zip(*judged, strict=True)).items():
+            kind = failure_kind({"outcome": VIOLATED, "avoidable": avoidable})
+            self.kinds[kind] += count
+            if kind == UNPREVENTABLE and ideal:
+                self.ideal[float(ideal) == 1.0] += count
+
+    def _count_drives(self, columns: Columns, valid: Sequence[bool]) -> None:
+        """Count how the ego came along in valid episodes."""
+        arrived, lost, frozen = (
+            list(filter(None, map(cell, compress(columns[name], valid)))) for name in DRIVES
+        )
+        for said, count in Counter(arrived).items():
+            self.arrivals[float(said) == 1.0] += count
+        for seconds in map(float, lost):  # in the order of the rows: sums of floats depend on it
+            self.lost_s += seconds
+        self.compared += len(lost)
+        self.frozen.update(frozen)
 
     @property
     def episodes(self) -> int:
@@ -96,7 +148,7 @@ class Found:
     @property
     def errors(self) -> int:
         """The number of error episodes."""
-        return self.outcomes["error"]
+        return self.outcomes[ERROR]
 
     def rate(self, name: str, *, sequential: bool = False) -> Rate:
         """A rate, one of ``RATES``: tests among valid episodes, failures among tests."""
@@ -130,41 +182,39 @@ class Tally:
         self.agents: dict[str, Found] = {}
         self.first: dict[str, Row] = {}
         self.rows = 0
+        self._seen: set[tuple[Any, ...]] = set()
 
     def add(self, row: Row) -> None:
         """Count one more row, as made or as read."""
-        found = self.agents.setdefault(row["agent"], Found())
-        self.rows += 1
-        found.outcomes[row["outcome"]] += 1
-        found.fresh += row.get("reset") == "fresh"
-        for name, verdict in verdicts_of(row).items():
-            found.verdicts.setdefault(name, Counter())[verdict] += 1
-        if row.get("forecast"):
-            found.forecasts.setdefault(row["forecast"], Counter())[is_test(row)] += 1
-        if row["outcome"] in ("error", INVALID):
-            self.first.setdefault(row["outcome"], row)
-            return
-        if is_test(row):
-            found.times[float(cell(row["trigger_time_s"]))] += 1
-            self.first.setdefault("test", row)
-        else:
-            found.censored[float(cell(row["time_s"]))] += 1
-        if kind := failure_kind(row):
-            found.kinds[kind] += 1
-            self.first.setdefault(kind, row)
-        self._add_drive(found, row)
+        self.add_rows([row])
 
-    def _add_drive(self, found: Found, row: Row) -> None:
-        """Count how the ego came along in a valid episode."""
-        arrived, lost, frozen = (cell(row.get(c)) for c in ("arrived", "lost_s", "frozen"))
-        if arrived:
-            found.arrivals[float(arrived) == 1.0] += 1
-        if lost:
-            found.lost_s += float(lost)
-            found.compared += 1
-        if frozen:
-            found.frozen[frozen] += 1
-            self.first.setdefault("frozen", row)
+    def add_rows(self, rows: Iterable[Row]) -> None:
+        """Count rows; many are counted faster together."""
+        rows = iter(rows)
+        while some := list(islice(rows, AT_ONCE)):
+            self.add_all({n: [row.get(n) for row in some] for n in COUNTED}, some.__getitem__)
+
+    def add_all(self, columns: Columns, row: Callable[[int], Row]) -> None:
+        """Count rows given by columns, all of ``COUNTED``; ``row`` gives one of them by its place.
+
+        The same as each of them by ``add``, in the order of the rows.
+        """
+        agents = columns["agent"]
+        self.rows += len(agents)
+        for agent in dict.fromkeys(agents):
+            found = self.agents.setdefault(agent, Found())
+            own = [one == agent for one in agents]
+            found.count({name: list(compress(columns[name], own)) for name in COUNTED})
+        self._note_first(columns, row)
+
+    def _note_first(self, columns: Columns, row: Callable[[int], Row]) -> None:
+        """Note the first rows of their kinds."""
+        for place, told in enumerate(zip(*(columns[name] for name in KINDS), strict=True)):
+            if told not in self._seen:
+                self._seen.add(told)
+                for kind in _kinds(dict(zip(KINDS, told, strict=True))):
+                    if kind not in self.first:
+                        self.first[kind] = row(place)
 
     def facts(self) -> dict[str, Any]:
         """The counts, for the manifest: episodes by outcome, failures by kind."""
@@ -183,8 +233,8 @@ def found_by(agents: Iterable[Found]) -> Found:
     together = Found()
     for found in agents:
         together.outcomes.update(found.outcomes)
-        together.fresh += found.fresh
         together.kinds.update(found.kinds)
+        together.ideal.update(found.ideal)
         together.arrivals.update(found.arrivals)
         together.lost_s += found.lost_s
         together.compared += found.compared
@@ -192,9 +242,22 @@ def found_by(agents: Iterable[Found]) -> Found:
     return together
 
 
-def tallied(rows: Iterable[Mapping[Any, Any]]) -> Found:
-    """The counts of some rows, of any agents."""
-    tally = Tally()
-    for row in rows:
-        tally.add(row)
-    return tally.all
+def _kinds(row: Row) -> Iterator[str]:
+    """The kinds of which a row can be the first."""
+    if row["outcome"] in (ERROR, INVALID):
+        yield row["outcome"]
+        return
+    if is_test(row):
+        yield "test"
+    if kind := failure_kind(row):
+        yield kind
+    if cell(row["frozen"]):
+        yield "frozen"
+
+
+def _times(cells: Iterable[Any]) -> Counter[float]:
+    """How often there are which times [s], as the CSV has them."""
+    found: Counter[float] = Counter()
+    for text, count in Counter(map(cell, cells)).items():
+        found[float(text)] += count
+    return found

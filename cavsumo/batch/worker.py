@@ -7,7 +7,6 @@ therefore waits on a pipe with a deadline, and a crash or a hang costs one row.
 from __future__ import annotations
 
 import contextlib
-import dataclasses
 import os
 import signal
 import socket
@@ -17,19 +16,17 @@ import sys
 import tempfile
 import threading
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from multiprocessing import Pipe
 from multiprocessing.connection import Connection
 
 from cavsumo.batch.jobs import Job, failed
 from cavsumo.batch.messages import Answer, Reply, Task
 from cavsumo.batch.prepared import PreparedBatch
-from cavsumo.errors import BatchError, InputError
+from cavsumo.errors import BatchError, InputError, plain
 from cavsumo.model.offspring import kill_descendants
 from cavsumo.model.own_folders import OwnFolder, sweep_once
-from cavsumo.model.processes import by_a_lasting_thread, ending, inner_environment
-from cavsumo.model.scenario import Simulation
-from cavsumo.results.rows import is_test
+from cavsumo.model.processes import by_a_lasting_thread, ending, inner_environment, last_words
 
 STARTUP_S = 120.0  # imports, SUMO's first start and that of the ego, on a slow machine
 STUCK_S = 20  # longest interruption of a message
@@ -151,7 +148,7 @@ class Worker:
             self._process = by_a_lasting_thread(lambda: self._started(fds, environment))
         except OSError as error:
             raise InputError(
-                f"cannot start a process in {self.prepared.folder!r}: {error}"
+                f"cannot start a process in {self.prepared.folder!r}: {plain(error)}"
             ) from error
         finally:
             theirs.close()  # so that its death is seen as the end of the pipe
@@ -188,7 +185,7 @@ class Worker:
         except BlockingIOError:  # it began to answer
             raise _ProcessGone(f"stuck in its answer for {STUCK_S} s, killed") from None
         except (EOFError, OSError):
-            raise _ProcessGone(self._end() + self._last_words()) from None
+            raise _ProcessGone(self._end() + last_words(self._log.fileno())) from None
         raise _ProcessGone(f"no answer within {deadline:g} s, killed")
 
     def _end(self) -> str:
@@ -199,13 +196,6 @@ class Worker:
         except subprocess.TimeoutExpired:
             return "the simulation process closed its pipe, killed"
         return f"the simulation process {ending(code)}"
-
-    def _last_words(self) -> str:
-        """The last line that the process printed below Python."""
-        self._log.seek(0)
-        text = self._log.read().decode("utf-8", errors="replace")
-        lines = [line.strip() for line in text.splitlines() if line.strip()]
-        return f" ({lines[-1]})" if lines else ""
 
     def _dismiss(self) -> None:
         """Let a process that waits for a job, and its ego, end by themselves."""
@@ -261,29 +251,9 @@ def join_group(group: set[Worker]) -> None:
     _THREAD.group = group
 
 
-def play(prepared: PreparedBatch, jobs: Sequence[Job]) -> list[Answer]:
-    """Play jobs in a process of this thread; the function that every executor calls.
-
-    Several jobs share one simulation. Tests found there are played again, each in a simulation of
-    its own, which counts.
-    """
-    worker = _own_worker(prepared)
-    if prepared.plan.reset == "fresh":
-        return [worker.play(job) for job in jobs]
-    return [
-        worker.play(job) if is_test(answer.outcome.row) else answer
-        for job, answer in zip(jobs, search(worker, jobs), strict=True)
-    ]
-
-
-def search(worker: Worker, jobs: Sequence[Job]) -> list[Answer]:
-    """Play jobs one after another in one simulation; after an error, in a new one."""
-    answers: list[Answer] = []
-    for job in jobs:
-        goes_on = bool(answers) and answers[-1].outcome.row["outcome"] != "error"
-        simulation: Simulation = "same" if goes_on else "new"
-        answers.append(worker.play(dataclasses.replace(job, simulation=simulation)))
-    return answers
+def play(prepared: PreparedBatch, job: Job) -> Answer:
+    """Play a job in a process of this thread; the function that every executor calls."""
+    return _own_worker(prepared).play(job)
 
 
 def try_out(prepared: PreparedBatch) -> None:

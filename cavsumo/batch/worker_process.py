@@ -8,6 +8,7 @@ inside SUMO, where Python does not run.
 from __future__ import annotations
 
 import contextlib
+import gc
 import os
 import signal
 import sys
@@ -15,16 +16,17 @@ from multiprocessing.connection import Connection
 from typing import TYPE_CHECKING
 
 from cavsumo.batch.messages import Reply, Task
-from cavsumo.errors import CavsumoError
+from cavsumo.errors import CavsumoError, plain
+from cavsumo.model.fork_child import ALARM_AFTER_S, places
+from cavsumo.model.forks import can_fork
 from cavsumo.model.objects import take
 from cavsumo.model.offspring import adopt_orphans, kill_descendants
 from cavsumo.model.processes import end_with_parent
 
 if TYPE_CHECKING:
-    from cavsumo.batch.episode_runner import EpisodeRunner
+    from cavsumo.batch.episode_server import EpisodeServer
 
 IDLE_S = 60.0  # an idle process ends after this time
-ALARM_AFTER_S = 30.0  # time after an episode's deadline at which the process ends itself
 
 
 def main(pipe_fd: int, log_fd: int, parent: int) -> None:
@@ -36,16 +38,18 @@ def main(pipe_fd: int, log_fd: int, parent: int) -> None:
     divert_output(log_fd)
     pipe = Connection(pipe_fd)
     with contextlib.suppress(EOFError, ConnectionError):  # the parent is gone or has no more jobs
-        _serve(pipe, pipe.recv())
+        _serve(pipe, pipe.recv(), log_fd)
     sys.stderr.flush()
     kill_descendants(os.getpid())  # daemons of the ego that have left their process tree
     os._exit(0)  # an orderly end of Python and its libraries takes longer than an episode
 
 
-def _serve(pipe: Connection, first: Task) -> None:
+def _serve(pipe: Connection, first: Task, log: int) -> None:
     """Try out the ego and SUMO once, then play, unless that is refused."""
     from cavsumo.batch.episode_runner import EpisodeRunner
+    from cavsumo.batch.episode_server import EpisodeServer
 
+    own = frozenset(places() if can_fork() else ())
     prepared = first.batch
     assert prepared is not None
     with contextlib.ExitStack() as stack:
@@ -55,13 +59,17 @@ def _serve(pipe: Connection, first: Task) -> None:
             runner = stack.enter_context(EpisodeRunner(prepared))
             runner.try_out(strict=first.strict)
         except (CavsumoError, OSError) as error:
-            pipe.send(Reply("refused", str(error)))
+            pipe.send(Reply("refused", plain(error)))
             return
+        gc.collect()
+        gc.freeze()  # what is there now stays: it need not be looked through again and again
         pipe.send(Reply("ready"))
-        _play(pipe, runner, prepared.plan.deadline_s)
+        deadline = prepared.plan.deadline_s
+        streams = sys.stderr.fileno(), log
+        _play(pipe, EpisodeServer(runner, deadline, streams, own), deadline)
 
 
-def _play(pipe: Connection, runner: EpisodeRunner, deadline: float) -> None:
+def _play(pipe: Connection, server: EpisodeServer, deadline: float) -> None:
     """Play jobs until the process is idle for long.
 
     ``deadline``: of each simulation [s].
@@ -78,7 +86,7 @@ def _play(pipe: Connection, runner: EpisodeRunner, deadline: float) -> None:
         task: Task = pipe.recv()
         assert task.job is not None
         alarm()
-        answer = runner.play(task.job, beat)
+        answer = server.play(task.job, beat)
         signal.setitimer(signal.ITIMER_REAL, 0.0)
         pipe.send(Reply("played", answer=answer))
     pipe.send(Reply("goodbye"))

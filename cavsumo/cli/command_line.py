@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import os
 import sys
 from collections.abc import Sequence
 from typing import Any
@@ -18,8 +17,8 @@ from cavsumo.errors import (
     Exit,
     InputError,
     UnknownName,
+    plain,
     sentence,
-    shown,
 )
 
 HYPHENATED = ("--bbox", "--ego-route", "--junction")  # options whose values may begin with "-"
@@ -47,8 +46,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     except OSError as error:  # a path that the system does not take: too long, not readable
         if error.filename is None:
             raise
-        path = shown(os.fspath(error.filename))
-        return _refused(InputError(f"{path}: {error.strerror}"), Exit.USAGE)
+        return _refused(InputError(plain(error)), Exit.USAGE)
     except KeyboardInterrupt:
         return Exit.INTERRUPTED
 

@@ -7,6 +7,7 @@ from collections.abc import Callable, Collection, Sequence
 from typing import Any, NoReturn
 
 from cavsumo.errors import InputError, UnknownName
+from cavsumo.model.scenario.gone import GONE
 
 
 class OptionParser(argparse.ArgumentParser):
@@ -43,6 +44,8 @@ class OptionParser(argparse.ArgumentParser):
             if word == "--" or (self._subparsers is not None and word[:1] != "-"):
                 return
             known = self._option_string_actions
+            if name[2:] in GONE and name not in known and name[:2] == "--":
+                raise InputError(f"{name}: {GONE[name[2:]].words}")
             if word[:2] == "--" and " " not in name and name not in known:
                 command = self.prog.partition(" ")[2]
                 long = [option for option in known if option[:2] == "--"]

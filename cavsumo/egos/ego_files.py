@@ -16,8 +16,8 @@ from pathlib import Path
 
 from cavsumo.egos.external.ego import command_words
 from cavsumo.egos.specs import ego_files
-from cavsumo.errors import InputError
-from cavsumo.model.checksums import checksum
+from cavsumo.model.checksums import readable_checksum
+from cavsumo.model.visible_files import is_visible
 
 # Programs whose first file is what they execute, by the beginning of their names.
 _RUNNERS = re.compile(
@@ -47,7 +47,7 @@ class OutputWatch:
             touched = _touched(file)
             if str(file) not in self._outputs and self._touched.get(file) != touched:
                 self._touched[file] = touched
-                if _checksum(file) != self._inputs.get(str(file)):
+                if readable_checksum(file) != self._inputs.get(str(file)):
                     self._outputs.add(str(file))
         return sorted(self._outputs)
 
@@ -63,7 +63,7 @@ def data_files(spec: str) -> tuple[Path, ...]:
 def _program(spec: str) -> frozenset[Path]:
     """The files of a command that define the ego: its first word, and a script that it executes."""
     first, *others = command_words(spec.partition(":")[2])
-    script = next((file for file in map(Path, others) if file.is_file()), None)
+    script = next((file for file in map(Path, others) if is_visible(file)), None)
     elsewhere = not _RUNNERS.fullmatch(Path(first).name) or not _INLINE.isdisjoint(others)
     return frozenset({Path(first), *([] if script is None or elsewhere else [script])})
 
@@ -75,14 +75,6 @@ def _touched(file: Path) -> tuple[int, ...]:
     except OSError:
         return ()
     return stat.st_ino, stat.st_size, stat.st_mtime_ns, stat.st_ctime_ns
-
-
-def _checksum(file: Path) -> str | None:
-    """The SHA-256 of a file; None for a file that no longer exists."""
-    try:
-        return checksum(file)
-    except InputError:
-        return None
 
 
 def machine() -> str:

@@ -13,6 +13,7 @@ from cavsumo.egos.external.ego import EXTERNAL, command_words
 from cavsumo.model.objects import Copies, is_object
 from cavsumo.model.plugins import source_file
 from cavsumo.model.registry import Registry
+from cavsumo.model.visible_files import is_visible
 
 # Forms of an ego's name besides a registered name, for listings.
 FORMS: Mapping[str, str] = {
@@ -55,7 +56,7 @@ def ego_files(spec: str) -> tuple[Path, ...]:
         return ()
     if sort == "exec":
         words = dict.fromkeys(command_words(address))
-        return tuple(file for file in map(Path, words) if file.is_file())
+        return tuple(file for file in map(Path, words) if is_visible(file))
     controller_class(spec)
     source = source_file(spec)
     return (source,) if source else ()

@@ -19,7 +19,7 @@ from typing import Any
 from cavsumo.batch.prepared import PreparedBatch
 from cavsumo.envs.episodes import Seen
 from cavsumo.envs.settings import Roles
-from cavsumo.errors import CavsumoError, SimulationError
+from cavsumo.errors import CavsumoError, SimulationError, plain
 from cavsumo.model.processes import inner_environment
 from cavsumo.model.snapshot import Snapshot
 
@@ -92,7 +92,8 @@ class _Child:
                 process_group=0,
             )
         except OSError as error:
-            raise SimulationError(f"cannot start a process to simulate in: {error}") from error
+            said = f"cannot start a process to simulate in: {plain(error)}"
+            raise SimulationError(said) from error
         finally:
             theirs.close()
         self.end = weakref.finalize(self, _end, self._process, self._pipe, os.getpid())

@@ -13,6 +13,7 @@ from typing import Any, NamedTuple
 import shapely
 from shapely.geometry import LineString, Point
 
+from cavsumo.model.cells import Cells
 from cavsumo.model.polyline import Path
 
 REACH_M = 60.0  # how far a crossing line is followed; wider carriageways are not crossed
@@ -204,6 +205,8 @@ class Roads:
         shapely.prepare(self.carriageway)
         shapely.prepare(self._boundary)
         shapely.prepare(self.pavements)
+        self.on_carriageway = Cells(self.contains, self.edge_distance)
+        self._worlds: dict[tuple[float, bool], Cells] = {}
 
     def __reduce__(self) -> tuple[type[Roads], tuple[Any, ...]]:
         return Roads, (self.carriageway, self.lanes, list(self.pavements.geoms))
@@ -211,6 +214,15 @@ class Roads:
     def contains(self, x: float, y: float) -> bool:
         """Whether a point lies on the carriageway."""
         return bool(shapely.contains_xy(self.carriageway, x, y))
+
+    def within(self, reach: float, *, on_foot: bool) -> Cells:
+        """Whether points are within a reach [m] of a carriageway, ``on_foot`` or of a pavement."""
+        if (reach, on_foot) not in self._worlds:
+            far = self.walking_distance if on_foot else self.driving_distance
+            self._worlds[reach, on_foot] = Cells(
+                lambda x, y: far(x, y) <= reach, lambda x, y: abs(far(x, y) - reach)
+            )
+        return self._worlds[reach, on_foot]
 
     def edge_distance(self, x: float, y: float) -> float:
         """Distance to the nearest edge of a carriageway [m]."""

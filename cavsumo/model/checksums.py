@@ -6,6 +6,7 @@ import hashlib
 from pathlib import Path
 
 from cavsumo.errors import InputError
+from cavsumo.model.visible_files import is_visible
 
 
 def checksum(file: Path) -> str:
@@ -15,3 +16,13 @@ def checksum(file: Path) -> str:
             return hashlib.file_digest(stream, "sha256").hexdigest()
     except OSError as error:
         raise InputError(f"{str(file)!r}: cannot be read: {error.strerror}") from error
+
+
+def readable_checksum(file: Path) -> str | None:
+    """The SHA-256 of a file; None for one that is not there or that this user cannot read."""
+    if not is_visible(file):
+        return None
+    try:
+        return checksum(file)
+    except InputError:
+        return None

@@ -27,6 +27,13 @@ def read_text(
     file: Path, what: str, wrong: type[Exception] = InputError, largest: int = LARGEST_B
 ) -> str:
     """The text of a file (UTF-8); raises ``wrong`` in one sentence, which begins with ``what``."""
+    return decoded(read_bytes(file, what, wrong, largest), f"{what} {str(file)!r}", wrong)
+
+
+def read_bytes(
+    file: Path, what: str, wrong: type[Exception] = InputError, largest: int = LARGEST_B
+) -> bytes:
+    """The bytes of a file; raises ``wrong`` in one sentence, which begins with ``what``."""
     name = f"{what} {str(file)!r}"
     try:
         with file.open("rb") as stream:
@@ -36,6 +43,11 @@ def read_text(
         raise wrong(f"{name}: cannot be read: {reason}") from error
     if len(data) > largest:
         raise wrong(f"{name}: more than {largest} bytes, expected at most so many")
+    return data
+
+
+def decoded(data: bytes, name: str, wrong: type[Exception] = InputError) -> str:
+    """Bytes as text (UTF-8); raises ``wrong`` in one sentence, which begins with a name."""
     try:
         return data.decode("utf-8")
     except UnicodeDecodeError as error:

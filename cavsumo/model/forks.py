@@ -22,7 +22,7 @@ from collections.abc import Callable, Generator, Iterable, Mapping
 from functools import cache
 from typing import Any, Generic, TypeVar
 
-from cavsumo.errors import BranchError
+from cavsumo.errors import BranchError, plain
 from cavsumo.model.fork_child import (
     ALARM_AFTER_S,
     CHUNK,
@@ -58,21 +58,24 @@ class Fork(Generic[Result]):
     Args:
         work: called in the child; its result must be picklable.
         deadline: how long it may take [s].
-        keep: a descriptor of this process that the child keeps.
+        keep: descriptors of this process that the child keeps.
 
     Attributes:
         source: the descriptor from which its result is read.
         ends: when it is due, on the clock of ``time.monotonic`` [s].
+        code: once it has ended, its exit status, or the number of the signal, negative.
     """
 
+    code: int | None = None
+
     def __init__(
-        self, work: Callable[[], Result], deadline: float, keep: int | None = None
+        self, work: Callable[[], Result], deadline: float, keep: Iterable[int] = ()
     ) -> None:
         self._deadline, self.ends = deadline, time.monotonic() + deadline
         self._received = bytearray()
         open_now, follow_parent = places(), end_with_parent(os.getpid())
-        if keep is not None:
-            del open_now[keep]
+        for kept in keep:
+            open_now.pop(kept, None)
         drawn = random.getstate()  # Python seeds it anew in a fork
         flush()
         self.source, sink = os.pipe()
@@ -81,7 +84,7 @@ class Fork(Generic[Result]):
         except OSError as error:
             os.close(self.source)
             os.close(sink)
-            raise BranchError(f"no process for a branch: {error}") from error
+            raise BranchError(f"no process for a branch: {plain(error)}") from error
         if self._pid == 0:
             try:
                 follow_parent()
@@ -128,7 +131,8 @@ class Fork(Generic[Result]):
         """Wait for the end of a child that has sent all; how it ended, in words."""
         os.close(self.source)
         _, status = os.waitpid(self._pid, 0)
-        return ending(os.waitstatus_to_exitcode(status))
+        self.code = os.waitstatus_to_exitcode(status)
+        return ending(self.code)
 
     def kill(self) -> None:
         """Kill the child and what it has started."""

@@ -12,6 +12,7 @@ import shlex
 from pathlib import Path
 
 from cavsumo.errors import InputError, UnknownName
+from cavsumo.model.visible_files import is_visible
 
 DEFAULT = "crossing"
 ENDING = ".net.xml"
@@ -26,7 +27,7 @@ def names() -> list[str]:
 
 def is_named(net: Path) -> bool:
     """Whether a word is the name of a network and not a file."""
-    return not net.is_file() and str(net) in names()
+    return not is_visible(net) and str(net) in names()
 
 
 def network_file(net: Path) -> Path:
@@ -58,9 +59,22 @@ def routes_of(name: Path) -> Path | None:
     return routes if routes_file(routes).is_file() else None
 
 
+def named_routes(routes: Path, source: str = "") -> Path:
+    """The demand of the network of that name as plans hold it, or the path itself.
+
+    Raises UnknownName for a word that is neither a file nor the name of a network with a demand.
+    """
+    if not is_word(routes) or is_visible(routes):
+        return routes
+    found = routes_of(routes) if is_named(routes) else None
+    if found is None:
+        raise UnknownName("routes", str(routes), [n for n in names() if routes_of(Path(n))], source)
+    return found
+
+
 def routes_file(routes: Path) -> Path:
     """The file of the demand of a named network, or the path itself."""
-    named = routes.parent == ROUTES and not routes.is_file()
+    named = routes.parent == ROUTES and not is_visible(routes)
     return _folder("routes") / routes.name if named else routes
 
 

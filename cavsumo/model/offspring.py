@@ -12,7 +12,7 @@ import contextlib
 import os
 import signal
 import sys
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Collection, Iterable, Iterator
 from pathlib import Path
 
 PR_SET_CHILD_SUBREAPER = 36  # Linux, prctl(2)
@@ -31,6 +31,21 @@ def adopt_orphans() -> None:
 def kill_descendants(parent: int) -> None:
     """Kill all descendants of a process, but not the process itself, until there are none."""
     _kill_until_none(lambda: descendants(parent))
+
+
+def kill_strays(kept: Collection[int]) -> None:
+    """Kill and reap the descendants that this process has, apart from some."""
+    here = os.getpid()
+    _kill_until_none(lambda: [pid for pid in descendants(here) if pid not in kept])
+    for pid in children(here):
+        if pid not in kept:
+            with contextlib.suppress(ChildProcessError):
+                os.waitpid(pid, 0)
+
+
+def children(parent: int) -> list[int]:
+    """The children of a process, those too that have ended but are not yet reaped."""
+    return [pid for pid, above, _ in _processes() if above == parent]
 
 
 def kill_those_with(tmpdir: str) -> None:

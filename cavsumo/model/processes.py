@@ -55,6 +55,13 @@ def ending(code: int) -> str:
     return f"ended with status {code}"
 
 
+def last_words(log: int) -> str:
+    """The last line of a file, given its descriptor, in brackets after a space; or nothing."""
+    text = os.pread(log, os.fstat(log).st_size, 0).decode("utf-8", errors="replace")
+    lines = [line.strip() for line in text.splitlines() if line.strip()]
+    return f" ({lines[-1]})" if lines else ""
+
+
 def inner_environment() -> dict[str, str]:
     """The environment of a process of cavsumo that finds the modules that this one finds."""
     outer = os.environ.get("PYTHONPATH", "")

@@ -7,8 +7,8 @@ from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any, Generic, TypeVar
 
-from cavsumo.errors import InputError, UnknownName
-from cavsumo.model.names import Names
+from cavsumo.errors import InputError
+from cavsumo.model.names import Names, check_parameters, check_shared
 
 T = TypeVar("T")
 
@@ -84,12 +84,7 @@ class Registry(Generic[T]):
         Raises UnknownName for a key that none of them has.
         """
         known = {name: {p.name for p in self.parameters(name)} for name in names}
-        everybodys = {key for keys in known.values() for key in keys}
-        qualified = {f"{name}.{key}" for name, keys in known.items() for key in keys}
-        for key in params:
-            valid = qualified if "." in key else everybodys
-            if key not in valid:
-                raise UnknownName("parameter", key, valid, f"{self.sort} {' '.join(known)}")
+        check_shared(params, known, f"{self.sort} {' '.join(known)}")
         return {
             name: {key: value for key, value in params.items() if key in keys}
             | {
@@ -106,9 +101,8 @@ class Registry(Generic[T]):
         known = [p.name for p in self.parameters(name)]
         signature = inspect.signature(entry).parameters.values()
         free = any(p.kind is p.VAR_KEYWORD for p in signature)
-        for key in params:
-            if key not in known and not free:
-                raise UnknownName("parameter", key, known, f"{self.sort} {name}")
+        if not free:
+            check_parameters(params, known, f"{self.sort} {name}")
         try:
             return entry(**params)
         except (TypeError, ValueError) as error:

@@ -14,13 +14,15 @@ from cavsumo.model.scenario import check_keys
 
 VARY = "vary"  # the table that makes a study of a scenario file
 PATH_KEYS = ("net", "routes", "additional")
+NAMED_KEYS = ("net", "routes")  # of those, what may be the name of a network of cavsumo's
 
 
 def read_config(file: Path) -> dict[str, Any]:
     """The settings of a scenario file (TOML) that describes one scenario."""
     data = read_toml(file)
     if VARY in data:
-        raise InputError(f"config {str(file)!r}: [{VARY}] makes several of it; expected one")
+        what = "makes several batches of it; cavsumo.run_study plays them"
+        raise InputError(f"config {str(file)!r}: [{VARY}] {what}")
     return settings_in(data, file)
 
 
@@ -48,7 +50,7 @@ def _resolved(key: str, value: Any, folder: Path) -> Any:
     if isinstance(value, list):
         return [str(folder / str(v)) for v in value]
     file = folder / str(value)
-    if key == "net" and not file.is_file():
+    if key in NAMED_KEYS and not file.is_file():
         word = Path(str(value))
         if is_named(word) or (is_word(word) and not file.exists()):
             return str(value)

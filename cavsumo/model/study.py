@@ -74,8 +74,8 @@ def read_study(file: Path, given: Mapping[str, Any]) -> list[Part]:
         for name in sorted({name for choice in options for name in choice.settings}):
             if name in given and name not in TABLES:
                 raise InputError(
-                    f"config {str(file)!r}: {VARY}.{key} varies {name}, which is given on the "
-                    "command line as well"
+                    f"config {str(file)!r}: {VARY}.{key} varies {name}, which is given "
+                    "beside the file as well"
                 )
     try:
         return [

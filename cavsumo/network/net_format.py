@@ -9,7 +9,12 @@ from typing import NamedTuple
 FARTHEST = 1e8  # coordinates, lengths and times beyond it are damage [m, s]
 _NUMBER = re.compile(r"[-+]?(\d+\.?\d*|\.\d+)([eE][-+]?\d{1,3})?", re.ASCII)
 _WHOLE = re.compile(r"[-+]?\d{1,9}", re.ASCII)
-
+# What nearly all numbers and shapes are like; others are looked at part by part.
+_PLAIN = r"[-+]?\d{1,8}+(?:\.\d*+)?"
+_PLAIN_NUMBER = re.compile(_PLAIN, re.ASCII)
+_PLAIN_POINT = rf"{_PLAIN},{_PLAIN}(?:,{_PLAIN})?"
+_PLAIN_SHAPE = re.compile(rf"{_PLAIN_POINT}(?: {_PLAIN_POINT})*+", re.ASCII)
+_PLAIN_LINE = re.compile(rf"{_PLAIN_POINT}(?: {_PLAIN_POINT})++", re.ASCII)
 
 INSIDE = ("internal", "crossing", "walkingarea")  # functions of the edges inside junctions
 LEFT_OUT = ("connector",)  # of those that sumolib does not read
@@ -24,17 +29,21 @@ class Sort(NamedTuple):
 
 
 def _is_number(text: str) -> bool:
+    if _PLAIN_NUMBER.fullmatch(text):
+        return True
     found = _NUMBER.fullmatch(text.strip())
     return found is not None and abs(float(text)) <= FARTHEST
 
 
 def _is_shape(text: str) -> bool:
+    if _PLAIN_SHAPE.fullmatch(text):
+        return True
     points = [point.split(",") for point in text.split()]
     return all(len(point) in (2, 3) and all(map(_is_number, point)) for point in points)
 
 
 def _is_line(text: str) -> bool:
-    return len(text.split()) > 1 and _is_shape(text)
+    return _PLAIN_LINE.fullmatch(text) is not None or (len(text.split()) > 1 and _is_shape(text))
 
 
 def _numbers(count: int) -> Sort:

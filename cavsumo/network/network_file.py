@@ -16,11 +16,11 @@ def root_of(file: Path) -> dict[str, str]:
 
     Raises NetworkError for a file that is not there, is not XML, or is other XML.
     """
-    if file.is_dir():
-        raise NetworkError(f"network {str(file)!r}: is a folder, expected a .net.xml")
-    if not file.is_file():
-        raise NetworkError(f"network {str(file)!r}: no such file{_neighbours(file)}")
     try:
+        if file.is_dir():
+            raise NetworkError(f"network {str(file)!r}: is a folder, expected a .net.xml")
+        if not file.is_file():
+            raise NetworkError(f"network {str(file)!r}: no such file{_neighbours(file)}")
         with opened(file) as stream:
             _, root = next(ElementTree.iterparse(stream, events=("start",)))
     except (EOFError, zlib.error, gzip.BadGzipFile) as error:

@@ -5,7 +5,9 @@ A plain picklable record, derived once by the parent and sent to the simulating 
 
 from __future__ import annotations
 
+import gc
 from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from itertools import islice
 from pathlib import Path
@@ -160,11 +162,24 @@ def derive_site(
     ``ego_route`` is a list of edges, or one word for a turn. Raises InputError (UnknownName,
     NetworkError) in one sentence.
     """
-    network = read_network(net, foes=wishes.kind.name not in WALKING)
+    with uncollected():
+        network = read_network(net, foes=wishes.kind.name not in WALKING)
+        try:
+            return _derived(network, ego_route, junction, ego, wishes)
+        except ValueError as error:  # shapes without points, widths that are none
+            raise NetworkError(f"network {str(net)!r}: {error}") from error
+
+
+@contextmanager
+def uncollected() -> Iterator[None]:
+    """Collect no garbage meanwhile: a large network has many objects, and all of them stay."""
+    collecting = gc.isenabled()
+    gc.disable()
     try:
-        return _derived(network, ego_route, junction, ego, wishes)
-    except ValueError as error:  # shapes without points, widths that are none
-        raise NetworkError(f"network {str(net)!r}: {error}") from error
+        yield
+    finally:
+        if collecting:
+            gc.enable()
 
 
 def _derived(

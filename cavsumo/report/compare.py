@@ -27,6 +27,7 @@ EVENTS: dict[str, Callable[[pandas.DataFrame], pandas.Series]] = {
     "failures": lambda rows: rows["outcome"] == "violated",
     "tests": lambda rows: rows["outcome"].isin(("held", "violated")),
 }
+PAIRED = ["seed", "outcome", "avoidable"]  # columns by which episodes are paired and compared
 WORDS = {"preventable": "preventable failures"}  # for events, where the name alone is too short
 
 
@@ -114,7 +115,10 @@ def paired(first: Group, second: Group, event: str) -> Pairs:
     """
     happened = [
         EVENTS[event](valid).set_axis(valid["seed"])
-        for valid in (group.valid.drop_duplicates("seed", keep=False) for group in (first, second))
+        for valid in (
+            group.valid_cells(PAIRED).drop_duplicates("seed", keep=False)
+            for group in (first, second)
+        )
     ]
     left, right = happened[0].align(happened[1], join="inner")
     return Pairs(

@@ -108,10 +108,9 @@ def _floor(value: float, width: float) -> float:
 def distinct(group: Group, tests: Mapping[int, Described], batches: tuple[Batch, ...]) -> Distinct:
     """How different the tests and failures of a group are."""
     triggers, impacts, preventable = [], [], []
-    for row in group.rows[["batch", "avoidable"]].itertuples():
-        test = tests.get(int(row.Index))
-        if test is None:
-            continue
+    rows = group.rows[group.rows["outcome"].isin(("held", "violated"))]
+    for row in rows[["batch", "avoidable"]].itertuples():
+        test = tests[int(row.Index)]
         kind = batches[row.batch].plan.scenario.kind
         triggers.append(cell_of(test.trigger, kind, ""))
         if test.impact is not None:

@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from cavsumo.batch import sentences
-from cavsumo.batch.tally import tallied
 from cavsumo.report.grouping import Group, Told
 
 
@@ -32,8 +31,7 @@ class EgoDriving(Told):
 
 def driving(group: Group) -> EgoDriving:
     """How the ego came along in one group."""
-    valid = group.valid
-    found, stood = tallied(valid.to_dict("records")), valid["stood_s"].dropna()
+    found, stood = group.found, group.valid["stood_s"].dropna()
     return EgoDriving(
         *group.whose,
         arrived=found.arrivals[True],

@@ -51,17 +51,24 @@ class Described(NamedTuple):
     impact: Event | None
 
 
+UNTRACED = Described(Event(), None)  # a test that the ego passed, of which nothing is known
+
+
 def described(evidence: Evidence) -> dict[int, Described]:
     """Every test of the evidence, by the index of its row."""
     rows = evidence.rows
     tests = rows[rows["outcome"].isin(("held", "violated"))]
-    return dict(_each(evidence, tests))
+    nothing = (tests["outcome"] == "held") & (tests["trace"] == "")
+    found = dict.fromkeys(tests.index[nothing].tolist(), UNTRACED)
+    return found | dict(_each(evidence, tests[~nothing]))
 
 
 def _each(evidence: Evidence, tests: pandas.DataFrame) -> Iterator[tuple[int, Described]]:
-    """The tests one by one; only one trace is in memory at a time."""
-    for index, row in zip(tests.index, tests[USED].to_dict("records"), strict=True):
-        yield int(index), describe(row, evidence.batches[row["batch"]].csv_file)
+    """The tests one by one; only one row and one trace are in memory at a time."""
+    cells = zip(*(tests[name] for name in USED), strict=True)
+    for index, told in zip(tests.index.tolist(), cells, strict=True):
+        row = dict(zip(USED, told, strict=True))
+        yield index, describe(row, evidence.batches[row["batch"]].csv_file)
 
 
 def describe(row: Mapping[str, Any], csv_file: Path) -> Described:

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import pandas
 
+from cavsumo.batch.tally import AT_ONCE, COUNTED, Found
 from cavsumo.errors import InputError
 from cavsumo.report.load import Batch, Evidence
 from cavsumo.results.provenance import EXTENT, differences
@@ -63,10 +65,24 @@ class Group(Told):
     sequential: bool
     reference: str = ""
 
+    @cached_property
+    def found(self) -> Found:
+        """The counts of its rows."""
+        found = Found()
+        for start in range(0, len(self.rows), AT_ONCE):
+            rows = self.rows.iloc[start : start + AT_ONCE]
+            none = [None] * len(rows)
+            found.count({n: rows[n].tolist() if n in rows else none for n in COUNTED})
+        return found
+
     @property
     def valid(self) -> pandas.DataFrame:
         """The rows of valid episodes."""
-        return self.rows[~self.rows["outcome"].isin(("error", "invalid"))]
+        return self.valid_cells(list(self.rows))
+
+    def valid_cells(self, columns: list[str]) -> pandas.DataFrame:
+        """Some columns of the rows of valid episodes."""
+        return self.rows.loc[~self.rows["outcome"].isin(("error", "invalid")), columns]
 
 
 def grouped(evidence: Evidence, by: str = "agent") -> list[Group]:
@@ -82,7 +98,7 @@ def grouped(evidence: Evidence, by: str = "agent") -> list[Group]:
     place = evidence.rows["batch"].map(dict(enumerate(settings)))
     keys = [place, evidence.rows["agent"]]
     keys += [] if by == "agent" else [evidence.rows[by].map(_word)]
-    found = list(evidence.rows.groupby(keys, sort=False))
+    found = list(evidence.rows.groupby(keys, sort=False, observed=True))
     if len(found) > MOST:
         raise InputError(f"--by {by}: {len(found)} groups, expected a column with few values")
     found.sort(key=lambda item: item[0][0])  # stable: within a setting as they appear
@@ -124,10 +140,32 @@ def _apart(first: Batch, second: Batch, by: str) -> Iterator[str]:
     if by == "file":
         return iter(())
     empty: dict[str, Any] = {part: {} for part in COMPARED}
-    left, right = (empty | dict(batch.manifest) for batch in (first, second))
+    left, right = (empty | by_content(batch.manifest) for batch in (first, second))
     if by in WITH_FILES:
         left, right = left | {"sha256": {}}, right | {"sha256": {}}
     return differences(left, right, apart=APART | MEANT.get(by, frozenset()))
+
+
+def by_content(manifest: Mapping[str, Any]) -> dict[str, Any]:
+    """A manifest in which the scenario's files are named by their checksums.
+
+    A network that was given by its name and by its path is then the same one.
+    """
+    sums = dict(manifest.get("sha256") or {})
+    plan = dict(manifest.get("plan") or {})
+    scenario = dict(plan.get("scenario") or {})
+    files = [scenario.get("net"), scenario.get("routes"), *(scenario.get("additional") or ())]
+    named = {file: sums[file] for file in files if file in sums}
+    found = {
+        key: named.get(scenario[key], scenario[key]) for key in ("net", "routes") if key in scenario
+    }
+    if "additional" in scenario:
+        found["additional"] = [named.get(file, file) for file in scenario["additional"]]
+    return {
+        **manifest,
+        "plan": plan | {"scenario": scenario | found},
+        "sha256": {named.get(name, name): sha for name, sha in sums.items()},
+    }
 
 
 def _names(batches: Sequence[Batch], settings: Sequence[int]) -> dict[int, str]:

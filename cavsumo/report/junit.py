@@ -7,6 +7,7 @@ import shlex
 import xml.etree.ElementTree as ET
 from collections import Counter
 from collections.abc import Mapping, Sequence
+from functools import cache
 from typing import Any
 
 import pandas
@@ -15,6 +16,7 @@ from cavsumo.assertions.base import VIOLATED
 from cavsumo.batch import sentences
 from cavsumo.batch.sentences import event
 from cavsumo.batch.summary import interval, percent
+from cavsumo.egos.reference import IDEAL
 from cavsumo.report.driving import EgoDriving, driving
 from cavsumo.report.grouping import Group, reference_of
 from cavsumo.report.load import Batch, Evidence
@@ -62,6 +64,7 @@ def _properties(parent: ET.Element, agent: str, found: Rates) -> None:
         ("preventable", found.preventable) if judged else ("failures", found.failures),
         ("tests", found.tests),
         *([("unpreventable", found.unpreventable)] if judged else []),
+        *([(f"preventable-{IDEAL}-only", found.by_ideal)] if found.by_ideal else []),
         ("unfair", found.unfair),
     ):
         spans = "; ".join(f"{m} {interval(r)}" for m, r in share.intervals.items() if share.total)
@@ -76,7 +79,7 @@ def _properties(parent: ET.Element, agent: str, found: Rates) -> None:
 
 def _case(batch: Batch, agent: str, assertion: str, rows: pandas.DataFrame) -> ET.Element:
     """One agent and assertion: failed, held, or never tested."""
-    said = rows.apply(_verdict, axis=1, args=(assertion,)) if len(rows) else rows["outcome"]
+    said = _verdicts(rows, assertion)
     tests, failures = rows[said.isin(("held", "violated"))], rows[said == "violated"]
     case = ET.Element("testcase", classname=_legal(agent), name=assertion)
     case.set("time", f"{rows['wall_s'].sum():.3f}")
@@ -110,10 +113,16 @@ def _failed(batch: Batch, failures: Sequence[Mapping[Any, Any]], tests: int) -> 
     return f"{said}; apart from that {rest}" if rest else said
 
 
-def _verdict(row: Mapping[Any, Any], assertion: str) -> str:
-    """The verdict of an assertion on an episode; the outcome, if it is the only one recorded."""
-    alone = row["outcome"] if row["assertion"] == assertion else ""
-    return verdicts_of(row).get(assertion, alone)
+def _verdicts(rows: pandas.DataFrame, assertion: str) -> pandas.Series:
+    """The verdicts of an assertion; the outcome, if it is the only one recorded."""
+
+    @cache
+    def verdict(outcome: str, asserted: str, verdicts: str) -> str:
+        alone = outcome if asserted == assertion else ""
+        return verdicts_of({"verdicts": verdicts}).get(assertion, alone)
+
+    told = (rows[name] for name in ("outcome", "assertion", "verdicts"))
+    return pandas.Series(list(map(verdict, *told)), index=rows.index, dtype="object")
 
 
 def _replay(batch: Batch, row: Mapping[Any, Any], assertion: str) -> str:

@@ -9,11 +9,14 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+import numpy
 import pandas
+from pandas.api.types import union_categoricals
 
 from cavsumo.batch.stopping import looks_at_rows
 from cavsumo.errors import ResultsError, UnknownName
 from cavsumo.model.scenario import BatchPlan
+from cavsumo.results.columnar import Doubtful, blocks, constant
 from cavsumo.results.columns import COLUMNS
 from cavsumo.results.reading import whole_lines
 from cavsumo.results.recorded_plan import recorded_plan
@@ -27,6 +30,7 @@ NUMBERS = (
     "impact_speed_mps",
     "wall_s",
     "avoidable",
+    "avoidable_ideal",
     "arrived",
     "lost_s",
     "stood_s",
@@ -76,7 +80,8 @@ class Evidence:
     Attributes:
         batches: the sources of the rows.
         rows: the columns ``NEEDED``, those of ``ADDED``, the one asked for and ``batch``, the index
-            of the batch. Numbers are floats, NaN for none; words are text, empty for none.
+            of the batch. Numbers are floats, NaN for none; words are categories of text, empty for
+            none.
     """
 
     batches: tuple[Batch, ...]
@@ -95,8 +100,7 @@ def load(files: Sequence[Path], by: str = "agent") -> Evidence:
     _check_apart(files)
     batches = [_batch(file) for file in files]
     tables = [_rows(batch, i, by) for i, batch in enumerate(batches)]
-    rows = pandas.concat(tables, ignore_index=True)
-    return Evidence(tuple(batches), rows)
+    return Evidence(tuple(batches), together(tables))
 
 
 def _check_apart(files: Sequence[Path]) -> None:
@@ -118,23 +122,68 @@ def _rows(batch: Batch, index: int, by: str) -> pandas.DataFrame:
     """The rows of one file."""
     file = batch.csv_file
     columns = list(dict.fromkeys((*NEEDED, *([by] if by in COLUMNS else []))))
+    try:
+        tables = [_checked(block.table(columns, WHOLE), file) for block in blocks(file)]
+    except (Doubtful, ResultsError):  # read row by row it is accepted, or the first error is told
+        tables = [_checked(_read(file, columns), file)]
+    table = together(tables) if tables else _checked(_read(file, columns), file)
+    length, places = len(table), {"file": str(file), "net": batch.plan.scenario.name}
+    return table.assign(batch=index, **{k: constant(v, length) for k, v in places.items()})
+
+
+def _read(file: Path, columns: Sequence[str]) -> pandas.DataFrame:
+    """The columns of a file, as text, row by row."""
     pick = operator.itemgetter(*columns)
     cells = [pick(row) for _, row in whole_lines(file) if row is not None]
-    table = pandas.DataFrame(cells, columns=columns, dtype="object")
+    return pandas.DataFrame(cells, columns=list(columns), dtype="object")
+
+
+def _checked(table: pandas.DataFrame, file: Path) -> pandas.DataFrame:
+    """The same with numbers as numbers, and words as categories."""
     for column in (*WHOLE, *NUMBERS):
         table[column] = _numbers(table, column, file)
     _check_outcomes(table, file)
-    return table.assign(batch=index, file=str(file), net=batch.plan.scenario.name)
+    words = table.columns.difference([*WHOLE, *NUMBERS])
+    return table.astype(dict.fromkeys(words, "category"))
+
+
+def together(tables: Sequence[pandas.DataFrame]) -> pandas.DataFrame:
+    """Tables with the same columns below each other; categories stay categories."""
+    if len(tables) == 1:
+        return tables[0]
+    columns: dict[str, Any] = {}
+    for name, first in tables[0].items():
+        parts = [table[name] for table in tables]
+        if isinstance(first.dtype, pandas.CategoricalDtype):
+            columns[str(name)] = union_categoricals(parts)
+        else:
+            columns[str(name)] = pandas.concat(parts, ignore_index=True)
+    return pandas.DataFrame(columns, copy=False)
 
 
 def _numbers(table: pandas.DataFrame, column: str, file: Path) -> pandas.Series:
     """A column as numbers, whole ones for the seeds."""
+    if column in WHOLE and table[column].dtype == "int64":
+        return table[column]
+    if isinstance(table[column].dtype, pandas.CategoricalDtype):
+        return _numbers_of_categories(table[column])
     numbers = pandas.to_numeric(table[column].where(table[column] != ""), errors="coerce")
     wrong = (numbers.isna() & (table[column] != "")) | numbers.isin((math.inf, -math.inf))
     if column in WHOLE:
         wrong |= numbers.isna() | (numbers % 1 != 0)
     _refuse(table, wrong, column, "a whole number" if column in WHOLE else "a number", file)
     return numbers.astype("int64" if column in WHOLE else "float64")
+
+
+def _numbers_of_categories(texts: pandas.Series) -> pandas.Series:
+    """The same of a column that has few texts; raises Doubtful if any is no number."""
+    found = texts.cat.categories.to_numpy(object)
+    numbers = pandas.to_numeric(pandas.Series(found[found != ""], dtype="object"), errors="coerce")
+    if not numpy.isfinite(numbers).all():
+        raise Doubtful
+    values = numpy.full(len(found), numpy.nan)
+    values[found != ""] = numbers
+    return pandas.Series(values[texts.cat.codes], index=texts.index)
 
 
 def _check_outcomes(table: pandas.DataFrame, file: Path) -> None:

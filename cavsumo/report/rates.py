@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 from cavsumo.assertions.base import VIOLATED
-from cavsumo.batch.tally import tallied
+from cavsumo.batch.sentences import by_ideal
 from cavsumo.report.grouping import Group, Told
 from cavsumo.results.statistics import Rate, rate, sequential_rate
 
@@ -46,6 +46,8 @@ class Rates(Told):
         preventable: failures that the reference driver would have avoided, of tests.
         tests, failures, unfair: of valid episodes, of tests, of valid episodes.
         unpreventable: failures that it would not have avoided, of tests.
+        by_ideal: those of them that an ideal driver would have avoided, of tests; None if that was
+            not judged.
         not_judged: how many failures nobody judged.
         reference: who judged, empty if not all failures were judged.
         blame: by the rule broken first, as ``party:rule``, the most frequent first: of failures.
@@ -59,6 +61,7 @@ class Rates(Told):
     failures: Share
     unfair: Share
     unpreventable: Share
+    by_ideal: Share | None
     not_judged: int
     reference: str
     blame: Mapping[str, Share]
@@ -66,7 +69,7 @@ class Rates(Told):
 
 def rates(group: Group) -> Rates:
     """The shares of one group."""
-    found = tallied(group.rows.to_dict("records"))
+    found, ideal = group.found, by_ideal(group.found, group.reference)
     failed = group.rows[group.rows["outcome"] == VIOLATED]
 
     def of(name: str, total: str, words: str) -> Share:
@@ -83,11 +86,14 @@ def rates(group: Group) -> Rates:
         failures=of("failures", "tests", "tests"),
         unfair=of("unfair", "valid", "valid episodes"),
         unpreventable=of("unpreventable", "tests", "tests"),
+        by_ideal=None
+        if ideal is None
+        else share(ideal, found.tests, "tests", sequential=group.sequential),
         not_judged=found.not_judged,
         reference=group.reference,
         blame={
             rule or NO_RULE: share(count, found.failures, "failures", sequential=group.sequential)
-            for rule, count in failed["blame"].value_counts().items()
+            for rule, count in failed["blame"].astype("object").value_counts().items()
         },
     )
 

@@ -6,6 +6,7 @@ from collections.abc import Iterator, Sequence
 
 from cavsumo.batch.sentences import many
 from cavsumo.batch.summary import interval, percent
+from cavsumo.egos.reference import IDEAL
 from cavsumo.report.analysis import Report
 from cavsumo.report.cells import Labels, Table, number, p_value, span
 from cavsumo.report.compare import WORDS, PairedComparison
@@ -79,6 +80,7 @@ def _rates(found: Sequence[Rates], labels: Labels) -> Table:
         shares = {judged: one.preventable} if one.reference else {"failures": one.failures}
         shares |= {"tests": one.tests}
         shares |= {"unpreventable": one.unpreventable} if one.reference else {}
+        shares |= {f"preventable ({IDEAL} only)": one.by_ideal} if one.by_ideal else {}
         for what, share in (shares | {"unfair": one.unfair}).items():
             rows.append([*labels.cells(one), what, *_share(share, methods)])
         not_judged = one.not_judged if one.reference else 0

@@ -10,7 +10,7 @@ from cavsumo.model.scenario import BatchPlan
 
 if TYPE_CHECKING:  # the process that collects rows does not load SUMO
     from cavsumo.simulation.avoidability import Avoidability
-    from cavsumo.simulation.loop import Episode
+    from cavsumo.simulation.episode import Episode
 
 
 @dataclass(frozen=True)
@@ -20,7 +20,6 @@ class FinishedEpisode:
     Attributes:
         plan: of its batch.
         run, agent, seed: its number in the batch, the tester agent's label, its seed.
-        fresh: it was played in a simulation of its own.
         episode: the episode; None if it could not be played.
         avoidability: the judgement by the reference driver; None if not requested.
         error: the reason why it could not be played, empty if it was.
@@ -30,7 +29,6 @@ class FinishedEpisode:
     run: int
     agent: str
     seed: int
-    fresh: bool
     episode: Episode | None = None
     avoidability: Avoidability | None = None
     error: str = ""

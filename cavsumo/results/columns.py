@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from cavsumo.agents.base import Forecast
     from cavsumo.simulation.avoidability import Avoidability
     from cavsumo.simulation.ego_progress import EgoProgress
-    from cavsumo.simulation.loop import Episode
+    from cavsumo.simulation.episode import Episode
 
 Row = dict[str, Any]
 
@@ -110,9 +110,10 @@ _ALL = (
     Column("testers", "number of tester bodies", "", lambda f: f.plan.scenario.testers),
     Column(
         "reset",
-        "fresh: in a simulation of its own; shared: in one that other episodes used before",
+        "fresh: in a simulation of its own, always since 0.2; shared: in one that other episodes "
+        "used before",
         "",
-        lambda f: "fresh" if f.fresh else "shared",
+        lambda _: "fresh",
         words=True,
     ),
     Column(
@@ -299,6 +300,14 @@ _ALL = (
         "1 if the reference driver would have avoided the violation, else 0; empty if not judged",
         "",
         _retried(_avoidable),
+    ),
+    Column(
+        "avoidable_ideal",
+        "1 if the ideal driver would have avoided it (full braking at once), else 0; empty if not "
+        "judged",
+        "",
+        _retried(lambda found: None if found.by_ideal is None else int(found.by_ideal)),
+        since="0.2",
     ),
     Column(
         "reference",

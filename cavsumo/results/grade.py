@@ -27,7 +27,7 @@ from cavsumo.model.geometry import gap
 
 if TYPE_CHECKING:
     from cavsumo.simulation.avoidability import Avoidability
-    from cavsumo.simulation.loop import Episode
+    from cavsumo.simulation.episode import Episode
 
 INVALID_GRADE = -5.0
 MOST_S = 10.0  # a larger margin counts as this one, and so does a time that is not known

@@ -22,11 +22,11 @@ from collections.abc import Iterator
 from functools import cache
 from pathlib import Path
 
-from cavsumo.errors import ResultsError
+from cavsumo.errors import ResultsError, plain
 from cavsumo.model.own_folders import OwnFolder
+from cavsumo.results.trace_file import is_trace
 
 FOLDER = "inputs"
-TRACE = ".jsonl"  # how the name of a trace ends
 LARGEST = 512 * 2**20  # bytes; a larger file is not kept, and no more of one is decompressed
 TOO_LARGE = f"has more than {LARGEST // 2**20} MiB and is not kept: a replay elsewhere needs it too"
 LEVEL = 6  # of compression; on a network of 5 MB 9 takes two and a half times as long for 4 % less
@@ -40,7 +40,7 @@ KEPT = re.compile(NAME, re.ASCII)
 
 def inputs_folder(file: Path) -> Path:
     """The folder of the inputs that are kept with a results file, or with a trace."""
-    return (file.parent if file.suffix == TRACE else file.with_suffix("")) / FOLDER
+    return (file.parent if is_trace(file) else file.with_suffix("")) / FOLDER
 
 
 def kept_name(file: Path, sha: str) -> str:
@@ -114,7 +114,7 @@ def unpacked(folder: Path, sha: str) -> Path | None:
         new.replace(file)
     except (OSError, EOFError, ValueError, zlib.error) as error:
         shutil.rmtree(place, ignore_errors=True)
-        raise ResultsError(f"{str(kept)!r}: is damaged: {error}") from error
+        raise ResultsError(f"{str(kept)!r}: is damaged: {plain(error)}") from error
     return file
 
 

@@ -7,14 +7,15 @@ path, and that only where the file there is the recorded one.
 
 from __future__ import annotations
 
+import contextlib
 from collections.abc import Collection, Mapping
 from pathlib import Path
 from typing import Any, NamedTuple
 
 from cavsumo.agents.names import policy_file
 from cavsumo.errors import InputError
-from cavsumo.model.checksums import checksum
-from cavsumo.model.scenario import BatchPlan
+from cavsumo.model.checksums import checksum, readable_checksum
+from cavsumo.model.scenario import BatchPlan, Scenario
 from cavsumo.results.inputs import inputs_folder, unpacked
 
 
@@ -66,6 +67,24 @@ def present_paths(
     return found
 
 
+def gone(plan: BatchPlan) -> list[str]:
+    """The names of the files of a plan that cannot be read where they were."""
+    return [name for name, was in input_files(plan).items() if readable_checksum(was) is None]
+
+
+def placed_scenario(plan: BatchPlan, origin: Mapping[str, Any], file: Path) -> Scenario:
+    """The scenario of a recorded plan, to be played again: gone files are those of the results.
+
+    A file that is nowhere keeps its name, so that playing it is refused.
+    """
+    scenario, found = plan.scenario, dict[str, Path]()
+    own = {str(path) for path in (scenario.net, scenario.routes, *scenario.additional)}
+    for name in own.intersection(gone(plan)):
+        with contextlib.suppress(InputError):
+            found |= present_paths(plan, origin, file, [name])
+    return scenario.placed(found)
+
+
 class _Wanted(NamedTuple):
     """A file to find: the results that name it, its option, its recorded path and checksum."""
 
@@ -91,23 +110,23 @@ def _given(wanted: _Wanted, file: Path) -> Path:
     """The file that is said to be the wanted one."""
     if not file.is_file():
         raise InputError(f"{wanted.option}: no such file: {str(file)!r}")
-    if checksum(file) != wanted.sha:
-        raise _another(wanted, file)
+    if (sha := checksum(file)) != wanted.sha:
+        raise _another(wanted, file, sha)
     return file
 
 
 def _found(wanted: _Wanted, way_out: str) -> Path:
     """The wanted file where it was, beside the results or among their inputs."""
     places = (wanted.was, wanted.results.parent / wanted.was.name)
-    there = [file for file in places if file.is_file()]
-    for file in there:
-        if checksum(file) == wanted.sha:
+    sums = {file: sha for file in places if (sha := readable_checksum(file)) is not None}
+    for file, sha in sums.items():
+        if sha == wanted.sha:
             return file
     kept = unpacked(inputs_folder(wanted.results), wanted.sha)
     if kept is not None:
         return kept
-    if there:
-        raise _another(wanted, there[0])
+    if sums:
+        raise _another(wanted, *next(iter(sums.items())))
     option = wanted.option
     how = f"name it with {option} FILE or put it" if option.startswith("--") else "put it"
     without = way_out if option == "--routes" else ""
@@ -116,9 +135,9 @@ def _found(wanted: _Wanted, way_out: str) -> Path:
     )
 
 
-def _another(wanted: _Wanted, file: Path) -> InputError:
+def _another(wanted: _Wanted, file: Path, sha: str) -> InputError:
     """The refusal of a file with another checksum."""
     return InputError(
-        f"{wanted.option} {str(file)!r}: sha256 {checksum(file)[:12]}, not the {wanted} of "
+        f"{wanted.option} {str(file)!r}: sha256 {sha[:12]}, not the {wanted} of "
         f"{str(wanted.results)!r}"
     )

@@ -14,6 +14,7 @@ from cavsumo.assertions.specs import assertion_files
 from cavsumo.egos.specs import ego_files
 from cavsumo.model.checksums import checksum
 from cavsumo.model.scenario import Scenario
+from cavsumo.model.scenario.gone import without_gone
 from cavsumo.network.site import Site
 
 # Settings that determine how much of a batch is played, not its episodes.
@@ -52,7 +53,7 @@ def differences(
     first: Mapping[str, Any], second: Mapping[str, Any], *, apart: frozenset[str] = EXTENT
 ) -> Iterator[str]:
     """The differences of two manifests as batches, in words, without some settings."""
-    plans = [dict(m.get("plan") or {}) for m in (first, second)]
+    plans = [without_gone(m.get("plan") or {}) for m in (first, second)]
     scenarios = [plan.pop("scenario", {}) for plan in plans]
     for name, (was, is_) in (*unequal(*scenarios), *unequal(*plans)):
         if name not in apart:

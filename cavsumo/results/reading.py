@@ -23,11 +23,6 @@ HEADER = ",".join(COLUMNS) + "\n"
 FIRST = frozenset(name for name, column in COLUMNS.items() if column.since == "0.1")
 
 
-def trace_name(csv_file: Path, run: int) -> str:
-    """The path of an episode's trace, relative to the results file."""
-    return f"{csv_file.stem}/run{run:06d}.jsonl"
-
-
 def ego_log_name(csv_file: Path, run: int) -> str:
     """The path of the ego's output in an episode, relative to the results file."""
     return f"{csv_file.stem}/run{run:06d}.ego.log"

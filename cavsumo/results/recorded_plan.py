@@ -10,7 +10,7 @@ from pydantic import ValidationError
 
 from cavsumo.errors import ResultsError
 from cavsumo.model.documents import first_problem
-from cavsumo.model.scenario import BatchPlan
+from cavsumo.model.scenario import BatchPlan, check_teams
 from cavsumo.results.reading import STARTING, read_manifest
 
 
@@ -25,8 +25,10 @@ def recorded_plan(csv_file: Path) -> tuple[BatchPlan, dict[str, Any]]:
 def plan_in(origin: Mapping[str, Any], name: str) -> BatchPlan:
     """The plan in a manifest or in the head of a trace; raises ResultsError that begins with it."""
     try:
-        return BatchPlan.model_validate(origin["plan"])
+        plan = BatchPlan.model_validate(origin["plan"])
     except KeyError:
         raise ResultsError(f"{name}: holds no valid plan") from None
     except ValidationError as error:
         raise ResultsError(f"{name}: holds no valid plan: {first_problem(error)}") from error
+    check_teams(plan.scenario, name)
+    return plan

@@ -13,7 +13,7 @@ from typing import Any
 
 from pydantic import BaseModel, ConfigDict, ValidationError
 
-from cavsumo.agents.recorded import Recorded
+from cavsumo.agents.recorded import Recorded, check_start
 from cavsumo.errors import ResultsError
 from cavsumo.model.bodies import Action
 from cavsumo.model.carriageway import StartRecord
@@ -72,6 +72,11 @@ def _check(found: _Parts) -> None:
         raise ResultsError("it has no frames")
     if not testers or len(found.waited) not in (0, testers):
         raise ResultsError(f"{testers} starts and {len(found.waited)} places to wait at")
+    for start in (*found.starts, *found.waited):
+        try:
+            check_start(start)
+        except ValueError as error:
+            raise ResultsError(str(error)) from error
     for step, joint in enumerate(found.actions):
         if len(joint) != testers and (joint or step < len(found.actions) - 1):
             raise ResultsError(f"step {step}: {len(joint)} actions of {testers} testers")

@@ -1,4 +1,4 @@
-"""The results of an episode: its row in the CSV, and the trace beside it as text.
+"""The results of an episode: its row in the CSV, and the trace beside it.
 
 Both are made in the simulating process, so that the collecting process only writes.
 """
@@ -22,12 +22,12 @@ class Outcome:
 
     Attributes:
         row: its row, by column.
-        trace: the frames to keep as JSON lines, empty for none.
+        trace: the bytes of its trace file, empty for none.
         ego_log: the output of an external ego, which may differ from run to run; mostly empty.
     """
 
     row: Row
-    trace: str = ""
+    trace: bytes = b""
     ego_log: str = ""
 
 

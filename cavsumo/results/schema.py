@@ -19,8 +19,14 @@ OUTCOMES = ("violated", "held", "unfair", "not_triggered", "invalid", "error")
 # Columns that are computed with: whole numbers, and other numbers, which may be empty.
 WHOLE = ("run", "seed")
 NUMBERS = ("trigger_time_s", "violation_time_s", "time_s", "impact_speed_mps", "wall_s")
-_WHOLE = re.compile(r"[0-9]{1,19}")
-_NUMBER = re.compile(r"-?[0-9]{1,15}(\.[0-9]{1,9})?")
+# Of which outcomes a number may not be empty.
+NEEDED: Mapping[str, tuple[str, ...]] = {
+    "trigger_time_s": ("held", "violated"),
+    "violation_time_s": ("violated",),
+    "time_s": tuple(outcome for outcome in OUTCOMES if outcome != "error"),
+}
+WHOLE_NUMBER = re.compile(r"[0-9]{1,19}")
+NUMBER = re.compile(r"-?[0-9]{1,15}(\.[0-9]{1,9})?")
 
 MOST = 1e9  # metres, seconds, radians and so on: beyond it a trace is damaged
 Finite = Annotated[float, Field(allow_inf_nan=False, ge=-MOST, le=MOST)]
@@ -133,16 +139,13 @@ def check_row(row: Mapping[str, str | None]) -> None:
     """
     outcome = row.get("outcome")
     for column in WHOLE:
-        if not _WHOLE.fullmatch(row.get(column) or ""):
+        if not WHOLE_NUMBER.fullmatch(row.get(column) or ""):
             raise _wrong(row, column, "a whole number")
     if outcome not in OUTCOMES:
         raise _wrong(row, "outcome", "one of " + ", ".join(OUTCOMES))
-    needed = {"trigger_time_s"} if outcome in ("held", "violated") else set()
-    needed |= {"violation_time_s"} if outcome == "violated" else set()
-    needed |= {"time_s"} if outcome != "error" else set()
     for column in NUMBERS:
         cell = row.get(column) or ""
-        if (cell or column in needed) and not _NUMBER.fullmatch(cell):
+        if (cell or outcome in NEEDED.get(column, ())) and not NUMBER.fullmatch(cell):
             raise _wrong(row, column, "a number")
 
 

@@ -1,9 +1,10 @@
 """Traces: the record of an episode, with all data for playing it again on another machine.
 
-JSON lines. The first is the head: the row, the plan, what the agents knew before, the checksums of
-the files, the versions, the boxes of all bodies, where the testers started, and who of the
-background departed. Then one frame a timestep, with what the testers chose then. The head holds
-nothing that says how much of a batch was played, so a trace is the same in every shard.
+JSON lines, compressed (``trace_file``). The first is the head: the row, the plan, what the agents
+knew before, the checksums of the files, the versions, the boxes of all bodies, where the testers
+started, and who of the background departed. Then one frame a timestep, with what the testers chose
+then (``frame_text``). The head holds nothing that says how much of a batch was played, so a trace
+is the same in every shard.
 """
 
 from __future__ import annotations
@@ -19,16 +20,17 @@ from typing import Any, NamedTuple
 
 from cavsumo.agents.recorded import Recorded
 from cavsumo.errors import ResultsError, shown
-from cavsumo.model.bodies import Action, Body
-from cavsumo.model.documents import json_of, read_text
+from cavsumo.model.bodies import Body
+from cavsumo.model.documents import json_of
 from cavsumo.model.scenario import BatchPlan
-from cavsumo.model.snapshot import BodyState, Snapshot
+from cavsumo.model.snapshot import Snapshot
 from cavsumo.network.site import Site
 from cavsumo.results.columns import COLUMNS, Row
 from cavsumo.results.provenance import EXTENT, traffic_checksum, versions
 from cavsumo.results.recording import recording, recording_head
-from cavsumo.results.rows import cell
+from cavsumo.results.rows import Outcome, cell
 from cavsumo.results.schema import check_frame, check_head, check_row
+from cavsumo.results.trace_file import read_trace_text, unpacked
 from cavsumo.sumo.options import OPTIONS
 
 FORMAT = "cavsumo-trace-2"
@@ -37,7 +39,7 @@ FORMATS = ("cavsumo-trace-1", FORMAT)  # the first has neither starts, actions n
 NOT_REPLAYED = ("wall_s", "trace")
 # Settings that say how a batch is played and kept and not what its episodes are; what is known is
 # the memory in the head.
-MANNER = EXTENT | {"shard", "trace", "reset", "known"}
+MANNER = EXTENT | {"shard", "trace", "known"}
 MEMORY_MOST = 100_000  # characters of what an agent knew; one that knew more is not kept
 
 
@@ -56,7 +58,7 @@ class Trace:
 
     Attributes:
         head: all but the frames, see ``trace_head``.
-        frames: one a timestep, see ``frame``.
+        frames: one a timestep, see ``frame_text``.
     """
 
     head: Mapping[str, Any]
@@ -130,36 +132,16 @@ def _bodies(snapshots: Iterable[Snapshot]) -> list[dict[str, Any]]:
     """All bodies in the order of appearance, those with the same box together."""
     met: dict[str, Body] = {}
     for snapshot in snapshots:
-        for body in (snapshot.ego.body, *(t.body for t in snapshot.testers)):
-            met.setdefault(body.id, body)
+        if not met:  # the ego and the testers are in all of them
+            met = {state.body.id: state.body for state in (snapshot.ego, *snapshot.testers)}
         for raw in snapshot.raw_background:
-            met.setdefault(raw[0].id, raw[0])
+            if raw[0].id not in met:
+                met[raw[0].id] = raw[0]
     alike: dict[Shape, list[str]] = {}
     for name, (_, kind) in met.items():
         shape = Shape(kind.name, kind.length, kind.width, kind.wheelbase)
         alike.setdefault(shape, []).append(name)
     return [{"box": list(shape), "ids": names} for shape, names in alike.items()]
-
-
-def frame(snapshot: Snapshot, actions: Sequence[Action] = ()) -> dict[str, Any]:
-    """A snapshot as one line of a trace: every body as [x, y, v, o], in full precision.
-
-    ``actions``: what the testers' bodies did then, [throttle, steering] each; none at the end.
-    """
-    return {
-        "step": snapshot.step,
-        "time_s": snapshot.time,
-        "ego": _pose(snapshot.ego),
-        "steering": snapshot.ego_steering,
-        "testers": {t.id: _pose(t) for t in snapshot.testers},
-        "background": {b.id: _pose(b) for b in snapshot.background},
-        "lights": "".join(snapshot.lights),
-        "actions": [list(action) for action in actions],
-    }
-
-
-def _pose(state: BodyState) -> list[float]:
-    return [state.x, state.y, state.v, state.o]
 
 
 def states(frame: Mapping[str, Any]) -> Iterator[tuple[str, str, list[float]]]:
@@ -170,20 +152,25 @@ def states(frame: Mapping[str, Any]) -> Iterator[tuple[str, str, list[float]]]:
             yield part, name, state
 
 
-def trace_text(head: Mapping[str, Any], frames: Iterable[Mapping[str, Any]]) -> str:
-    """A trace as JSON lines."""
-    return "".join(json.dumps(line, allow_nan=False) + "\n" for line in (head, *frames))
+def trace_text(head: Mapping[str, Any], frames: Iterable[str]) -> str:
+    """A trace as JSON lines, from its head and the lines of its frames."""
+    return "".join([json.dumps(head, allow_nan=False), "\n", *frames])
 
 
 def read_trace(file: Path) -> Trace:
     """The trace in a file; raises ResultsError in one sentence."""
-    text = read_text(file, "trace", ResultsError)
+    text = read_trace_text(file)
     try:
         return parsed(text)
     except UnknownFormat as error:
         raise ResultsError(f"trace {str(file)!r}: {error}") from error
     except ValueError as error:
         raise ResultsError(f"trace {str(file)!r}: cannot be read: {error}") from error
+
+
+def trace_of(outcome: Outcome) -> Trace | None:
+    """The trace of an episode that was just played; None where none was kept."""
+    return parsed(unpacked(outcome.trace)) if outcome.trace else None
 
 
 class UnknownFormat(ValueError):
@@ -235,7 +222,7 @@ def read_moments(file: Path, times: Sequence[float]) -> list[tuple[float, dict[s
     Only those frames are parsed completely, because traces are long and a report reads thousands.
     """
     try:
-        first, *lines = _lines(read_text(file, "trace", ResultsError))
+        first, *lines = _lines(read_trace_text(file))
         acted = _head(first)["format"] != FORMATS[0]
         if not lines:
             raise ValueError("no frames")

@@ -32,13 +32,14 @@ from cavsumo.results.reading import (
     check_replaceable,
     ego_log_name,
     inside,
-    trace_name,
     whole_lines,
 )
 from cavsumo.results.rows import Outcome, row_line
+from cavsumo.results.trace_file import PACKED, PLAIN, trace_name
 
 RUNNING = "running"
 UNENCODABLE = "backslashreplace"  # file names may contain invalid Unicode
+BESIDE = (PACKED, PLAIN, ".ego.log")  # how the names of an episode's files end
 
 
 class Recorder:
@@ -131,16 +132,27 @@ class Recorder:
         """Append a row, its trace first; raises BatchError when the disk takes no more."""
         self._check_own()
         row = self._with_trace(outcome)
-        line = _line(row)
+        self._append(_line(row), row["run"])
+        return row
+
+    def copy(self, lines: bytes, last: int) -> None:
+        """Append lines that are rows as ``write`` would write them, without any files.
+
+        ``last``: the number of the last of them.
+        """
+        self._check_own()
+        self._append(lines, last)
+
+    def _append(self, lines: bytes, last: int) -> None:
+        """Append lines; none of them stays when the disk takes no more."""
         try:
-            _write_all(self._file, line)
+            _write_all(self._file, lines)
         except OSError as error:
             self._file.truncate(self._size)
             self._note(b"")
             raise self._no_more(error) from error
-        self._note(line)
-        self._last = row["run"]
-        return row
+        self._note(lines)
+        self._last = last
 
     def replace(self, outcomes: Mapping[int, Outcome]) -> None:
         """Replace some rows, all at once or not at all."""
@@ -189,21 +201,22 @@ class Recorder:
     def _with_trace(self, outcome: Outcome) -> Row:
         """The row, naming its trace if there is one; that and the ego's log are written."""
         row, name = dict(outcome.row), trace_name(self.csv_file, outcome.row["run"])
-        self.traces -= self._put(name, outcome.trace)
+        plain = trace_name(self.csv_file, row["run"], PLAIN)  # of a batch that 0.1 began
+        self.traces -= self._put(plain, b"") + self._put(name, outcome.trace)
         self.traces += bool(outcome.trace)
-        self._put(ego_log_name(self.csv_file, row["run"]), outcome.ego_log)
+        self._put(ego_log_name(self.csv_file, row["run"]), outcome.ego_log.encode("utf-8"))
         return row | {"trace": name} if outcome.trace else row
 
-    def _put(self, name: str, text: str) -> bool:
-        """Write a file beside the rows, none without text; returns whether one existed."""
+    def _put(self, name: str, content: bytes) -> bool:
+        """Write a file beside the rows, none without content; returns whether one existed."""
         file = self.csv_file.parent / name
         there = self._has_folder and os.path.lexists(file)  # links are not followed
         if there:
             file.unlink()
-        if text:
+        if content:
             try:
                 self.trace_folder.mkdir(exist_ok=True)
-                file.write_text(text, encoding="utf-8")
+                file.write_bytes(content)
             except OSError as error:
                 with suppress(OSError):
                     file.unlink()
@@ -272,7 +285,7 @@ class Recorder:
     def _remove_traces(self, after: int) -> None:
         """Remove the traces and logs of later episodes, and nothing else."""
         if self.trace_folder.is_dir():
-            for old in chain(*map(self.trace_folder.glob, ("run*.jsonl", "run*.ego.log"))):
+            for old in chain(*map(self.trace_folder.glob, (f"run*{end}" for end in BESIDE))):
                 number = old.name.removeprefix("run").partition(".")[0]
                 if number.isdecimal() and len(number) >= 6 and int(number) > after:
                     old.unlink()

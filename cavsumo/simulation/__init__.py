@@ -2,5 +2,5 @@
 
 ``playback`` plays an episode again from its record; ``avoidability`` does so with a reference
 driver where an episode was violated. No file here deals with files, processes or batches.
-To measure something new in every episode: ``loop.Episode``.
+To measure something new in every episode: ``episode.Episode``.
 """

@@ -28,7 +28,8 @@ from cavsumo.model.forks import can_fork, cost_of_fork, result_of
 from cavsumo.model.scene import Scene
 from cavsumo.model.snapshot import BodyState, Snapshot
 from cavsumo.simulation.avoidability_guess import foreseen
-from cavsumo.simulation.loop import Episode, EpisodeLoop
+from cavsumo.simulation.episode import Episode
+from cavsumo.simulation.loop import EpisodeLoop
 from cavsumo.simulation.playback import doing, playback, recorded
 from cavsumo.simulation.reruns import Rerun
 from cavsumo.simulation.setup import Setup
@@ -52,13 +53,15 @@ class Avoidability:
         last_chance: time of the latest perception with which it still would [s]; None if never.
         margin: how long before the violation that is [s].
         note: what kept it from being judged, or what to doubt, as a sentence.
-        perceived: when it perceived the risk [s]; None if not judged.
+        by_ideal: whether the ideal driver would have avoided it; None if not judged.
+        perceived: when the reference driver perceived the risk [s]; None if not judged.
     """
 
     avoidable: bool | None
     last_chance: float | None = None
     margin: float | None = None
     note: str = ""
+    by_ideal: bool | None = None
     perceived: float | None = None
 
 
@@ -105,14 +108,17 @@ class AvoidabilityCheck:
         assert time is not None
         return min(round(time / self.setup.world.dt), len(self.episode.frames) - 1)
 
-    def judged(self, reference: Reference) -> Avoidability:
-        """Whether a reference driver would have avoided it, and until when."""
+    def judged(self, reference: Reference, ideal: Reference | None = None) -> Avoidability:
+        """Whether a reference driver would have avoided it, and until when.
+
+        ``ideal``: another driver; of it only the first is asked (``Avoidability.by_ideal``).
+        """
         try:
-            return self._judged(reference)
+            return self._judged(reference, ideal)
         except CavsumoError as error:
             return Avoidability(None, note=f"not judged: {error}")
 
-    def _judged(self, reference: Reference) -> Avoidability:
+    def _judged(self, reference: Reference, ideal: Reference | None) -> Avoidability:
         self._check_moving()
         end, frames = self.end, self.episode.frames
         perceived, guess = self._perceived(reference), self._guess(reference)
@@ -134,11 +140,29 @@ class AvoidabilityCheck:
                 f"{MOST_RERUNS} reruns leave open whether a perception up to "
                 f"{frames[high - 1].time:.1f} s would have been early enough"
             )
-        found = Avoidability(avoidable, note="; ".join(notes), perceived=frames[perceived].time)
+        by_ideal = avoidable if type(ideal) is type(reference) else None
+        if ideal is not None and by_ideal is None:
+            by_ideal = self._first_avoided(ideal, avoided)
+        found = Avoidability(
+            avoidable,
+            note="; ".join(notes),
+            by_ideal=by_ideal,
+            perceived=frames[perceived].time,
+        )
         if low < 0:
             return found
         last, margin = frames[low].time, frames[end].time - frames[low].time
         return dataclasses.replace(found, last_chance=last, margin=margin)
+
+    def _first_avoided(
+        self, reference: Reference, avoided: Callable[[Reference, int], bool]
+    ) -> bool | None:
+        """Whether a reference driver avoids it from its perception on; None if a rerun fails."""
+        perceived = self._perceived(reference)
+        try:
+            return perceived < self.end and avoided(reference, perceived)
+        except CavsumoError:
+            return None
 
     def avoidable(self, reference: Reference) -> bool:
         """Whether a reference driver would have avoided it, by one rerun at most.
@@ -224,8 +248,8 @@ class AvoidabilityCheck:
             actions = [list(joint) for joint in self.episode.actions]
             kept.hand_over(doing(actions, len(self.setup.teams)))
             return Rerun(kept, self.episode, self.broken)
-        # Bodies that the rerun leaves out count with their states of the first episode.
-        record = self.record or any(a.sees_background for a in self.setup.assertions)
+        # Where nobody looks at the background, a rerun shows as much of it as contacts need.
+        record = any(a.sees_background for a in self.setup.assertions)
         setup = dataclasses.replace(self.setup, assertions=(self.broken,))
         loop = playback(setup, self._recorded, record=record, alike=self.agents)
         return Rerun(loop, self.episode, self.broken)

@@ -25,7 +25,8 @@ from cavsumo.agents.base import Agent
 from cavsumo.egos.base import Ego
 from cavsumo.errors import BranchError, CavsumoError, SimulationError
 from cavsumo.model.forks import can_fork, forked
-from cavsumo.simulation.loop import Episode, EpisodeLoop, Joint
+from cavsumo.simulation.episode import Episode, Joint
+from cavsumo.simulation.loop import EpisodeLoop
 from cavsumo.simulation.playback import doing
 
 DEADLINE_S = 60.0
@@ -161,11 +162,6 @@ def _replayed(
 ) -> Generator[Episode | BranchError]:
     """Branches played here, after which the episode's own simulation is brought back."""
     told = loop.setup.world.told
-    if not loop.setup.world.repeatable:
-        raise BranchError(
-            "a simulation that serves several episodes is branched by a fork alone, which this "
-            "process cannot have or was not to have"
-        )
     try:
         for how in continuations:
             with _own_numbers():

@@ -18,7 +18,8 @@ from cavsumo.egos.reference import Reference
 from cavsumo.errors import BranchError
 from cavsumo.model.forks import Fork, can_fork, cost_of_fork
 from cavsumo.simulation.avoidability import Avoidability, AvoidabilityCheck
-from cavsumo.simulation.loop import Episode, EpisodeLoop
+from cavsumo.simulation.episode import Episode
+from cavsumo.simulation.loop import EpisodeLoop
 from cavsumo.simulation.setup import Setup
 
 QUICK_S = 0.05  # a start that takes less takes less than twenty forks
@@ -51,22 +52,22 @@ class Checkpoint:
                 words = told.read()
             if not words:
                 return None
-            episode, reference = pickle.loads(words)
+            episode, references = pickle.loads(words)
             # places are known by identity
             episode.starts, episode.waited = loop.placed.starts, loop.placed.waited
-            return check(episode, loop).judged(reference)
+            return check(episode, loop).judged(*references)
 
         try:
-            self._fork = Fork(judges, 2 * deadline, keep=source)
+            self._fork = Fork(judges, 2 * deadline, keep=[source])
         finally:
             os.close(source)
 
-    def judged(self, episode: Episode, reference: Reference) -> Avoidability | None:
-        """Whether a reference driver would have avoided the violation; None if the fork failed."""
+    def judged(self, episode: Episode, *references: Reference | None) -> Avoidability | None:
+        """``AvoidabilityCheck.judged`` of the violation; None if the fork failed."""
         self._open = False
         try:
             with os.fdopen(self._sink, "wb") as sink:
-                pickle.dump((episode, reference), sink, pickle.HIGHEST_PROTOCOL)
+                pickle.dump((episode, references), sink, pickle.HIGHEST_PROTOCOL)
             return self._fork.awaited(self._deadline)
         except BranchError:
             return None
@@ -103,6 +104,7 @@ def begun(
     spent = time.process_time() - before
     if check is None or setup.ego.outside or not can_fork():
         return loop, None
-    if spent < QUICK_S or spent < WORTH * cost_of_fork():
+    slow = setup.world.simulations.stood_by  # another one would be started
+    if not slow and (spent < QUICK_S or spent < WORTH * cost_of_fork()):
         return loop, None
     return loop, Checkpoint(loop, check, deadline)

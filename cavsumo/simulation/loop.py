@@ -7,80 +7,24 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Sequence
 
 from cavsumo.agents.base import Agent, Forecast
 from cavsumo.assertions.base import INVALID, VIOLATED, Judgement, weightiest
 from cavsumo.assertions.blame import blamed
 from cavsumo.assertions.contacts import ContactMonitor
-from cavsumo.assertions.criticality_monitor import CriticalityMonitor, Extremes
-from cavsumo.assertions.naturalness import Naturalness
-from cavsumo.assertions.validity import Breach, ValidityMonitor
+from cavsumo.assertions.validity import ValidityMonitor
 from cavsumo.egos.base import Drive, Ego
-from cavsumo.errors import AgentError
 from cavsumo.model.bodies import Action
-from cavsumo.model.carriageway import Start
 from cavsumo.model.departures import Demand
-from cavsumo.model.kinematics import step_floats
-from cavsumo.model.scenario import Simulation
-from cavsumo.model.scene import Scene
-from cavsumo.model.snapshot import BodyState, Snapshot
-from cavsumo.simulation.ego_progress import EgoProgress, ego_progress
+from cavsumo.model.snapshot import Snapshot
+from cavsumo.simulation.ego_progress import ego_progress
+from cavsumo.simulation.ending import at_end, over
+from cavsumo.simulation.episode import Episode, Joint
+from cavsumo.simulation.moving import moved
 from cavsumo.simulation.rewards import Feedback, RewardMonitor
 from cavsumo.simulation.setup import Setup
 from cavsumo.simulation.starting import cast, generators_of, started
-
-# An episode whose verdict is open at the horizon may run on for this long [s].
-OVERTIME_S = 15.0
-
-
-# The actions of all agents at one timestep: for each agent those of its bodies.
-Joint = Sequence[Sequence[Action]]
-
-
-@dataclass
-class Episode:
-    """The record of an episode, during and after it.
-
-    ``seen``: all snapshots; frames and actions only where they are kept; ``drives``: whether the
-    ego steers itself; ``forecast``: what the testers said of it beforehand; ``starts``: where they
-    started, and ``waited``: where they were while the ego entered; ``departures``: of the
-    background, None where they were not recorded or do not tell all of it.
-    """
-
-    judgement: Judgement
-    verdicts: Mapping[str, str] = field(default_factory=dict)
-    steps: int = 0
-    time: float = 0.0
-    max_decel: float = 0.0
-    contacts: ContactMonitor = field(default_factory=ContactMonitor)
-    naturalness: Naturalness = field(default_factory=Naturalness)
-    breach: Breach | None = None
-    invalid: bool = False
-    blame: str = ""
-    rms_acceleration: float = 0.0
-    criticality: CriticalityMonitor = field(default_factory=CriticalityMonitor)
-    extremes: Extremes = field(default_factory=Extremes)
-    progress: EgoProgress = field(default_factory=EgoProgress)
-    cost: float = 0.0
-    reward: float = 0.0
-    sumo_collisions: frozenset[tuple[str, str]] = frozenset()
-    teleports: int = 0
-    emergency_stops: int = 0
-    seen: list[Snapshot] = field(default_factory=list)
-    frames: list[Snapshot] = field(default_factory=list)
-    actions: list[Joint] = field(default_factory=list)
-    starts: tuple[Start, ...] = ()
-    waited: tuple[Start, ...] = ()
-    departures: Demand | None = None
-    drives: bool = False
-    forecast: Forecast | None = None
-
-    @property
-    def outcome(self) -> str:
-        """The outcome: the verdict, unless a tester broke the rules of the world before it."""
-        return INVALID if self.invalid else self.judgement.verdict
 
 
 class EpisodeLoop:
@@ -91,7 +35,6 @@ class EpisodeLoop:
         seed: of the episode; every random number in it comes from here.
         record: keep every snapshot, and show everybody in it.
         keep: keep every snapshot as it is, and what the agents chose, to play it again.
-        simulation: whose it is played in (``World.reset``).
         demand: departures of the background that were recorded, in place of the scenario's demand.
 
     Attributes:
@@ -112,12 +55,11 @@ class EpisodeLoop:
         *,
         record: bool = False,
         keep: bool = False,
-        simulation: Simulation = "own",
         demand: Demand | None = None,
     ) -> None:
         self.setup, self._agents = setup, agents
         self.scene, self._senses, begun, self._generators = started(
-            setup, agents, seed, record, simulation, demand
+            setup, agents, seed, record, demand
         )
         self.placed, self.snapshot = begun, begun.snapshot
         self._place = setup.world.begun
@@ -132,7 +74,7 @@ class EpisodeLoop:
         self._arrived = False
         self._learners = _learn(agents)
         self._observe(self.snapshot)
-        self._end(_over(setup, self.snapshot))
+        self._end(over(setup, self.snapshot))
 
     def step(self) -> Feedback | None:
         """One timestep: all choose, the world moves on; returns the agents' rewards.
@@ -142,12 +84,12 @@ class EpisodeLoop:
         setup, episode, snapshot, agents = self.setup, self._episode, self.snapshot, self._agents
         scene, views = self.scene, self.agent_views
         actions = [a.choose_action(view) for a, view in zip(agents, views, strict=True)]
-        states = _moved(snapshot.testers, setup.teams, actions, scene.dt)
+        states = moved(snapshot.testers, setup.teams, actions, scene.dt)
         command = setup.ego.act(self.ego_view)
         episode.drives = isinstance(command, Drive)
         self._chosen.append(actions)
         successor = setup.world.step(states, command)
-        if successor is None or (episode.drives and _at_end(scene, successor)):
+        if successor is None or (episode.drives and at_end(scene, successor)):
             self._arrived = True
             self._end(True)
             rewards = self._rewards.lost()
@@ -163,7 +105,7 @@ class EpisodeLoop:
         if self._learners:
             _feed_back(agents, views, actions, rewards, self.agent_views)
         self.snapshot = successor
-        self._end(_over(setup, successor))
+        self._end(over(setup, successor))
         return rewards
 
     def hand_over(
@@ -245,7 +187,7 @@ class EpisodeLoop:
         """
         episode, assertions = self._episode, self.setup.assertions
         contacts = episode.contacts.observe(snapshot)
-        if not any(a.judgement.verdict == VIOLATED for a in assertions):
+        if VIOLATED not in [a.judgement.verdict for a in assertions]:
             self._validity.observe(snapshot, episode.contacts.pairs)
         episode.naturalness.observe(snapshot)
         episode.criticality.observe(snapshot, contacts)
@@ -281,12 +223,9 @@ def play(
     *,
     record: bool = False,
     keep: bool = False,
-    simulation: Simulation = "own",
 ) -> Episode:
     """A whole episode; the arguments are those of ``EpisodeLoop``."""
-    return played_on(
-        EpisodeLoop(setup, agents, seed, record=record, keep=keep, simulation=simulation)
-    )
+    return played_on(EpisodeLoop(setup, agents, seed, record=record, keep=keep))
 
 
 def played_on(loop: EpisodeLoop) -> Episode:
@@ -307,42 +246,6 @@ def _foretold(agents: Sequence[Agent], views: Sequence[Snapshot]) -> Forecast | 
     return max((one for one in said if one is not None), default=None, key=Forecast.rank)
 
 
-def _moved(
-    testers: tuple[BodyState, ...],
-    teams: Sequence[Sequence[int]],
-    actions: Sequence[Sequence[Action]],
-    dt: float,
-) -> tuple[BodyState, ...]:
-    """The testers' next states by the kinematics (seed, eqs 8 to 19).
-
-    A body that stands keeps the same record object, and if all do, so does their tuple: identity
-    then tells, without comparing numbers, that nothing has changed.
-    """
-    moved: list[BodyState] = []
-    for team, joint in zip(teams, actions, strict=True):
-        if len(joint) != len(team):
-            raise AgentError(f"an agent with {len(team)} bodies chose {len(joint)} actions")
-        for i, (throttle, steering) in zip(team, joint, strict=True):
-            state = testers[i]
-            body, x, y, v, o = state
-            kind = body.kind
-            if not (
-                kind.throttle_min - 1e-9 <= throttle <= kind.throttle_max + 1e-9
-                and abs(steering) <= kind.steering_max + 1e-9
-            ):
-                raise AgentError(f"{body.id}: no such action: {throttle=}, {steering=}")
-            if v == 0.0 and throttle <= 0.0 and kind.v_min == 0.0:
-                continue
-            moved = moved or list(testers)
-            moved[i] = BodyState(
-                body,
-                *step_floats(
-                    x, y, v, o, throttle, steering, kind.wheelbase, kind.v_min, kind.v_max, dt
-                ),
-            )
-    return tuple(moved) if moved else testers
-
-
 def _feed_back(
     agents: Sequence[Agent],
     before: Sequence[Snapshot],
@@ -357,25 +260,6 @@ def _feed_back(
         agents, before, actions, rewards[0], after, strict=True
     ):
         agent.process_feedback(snapshot, action, reward, successor, rewards[1])
-
-
-def _over(setup: Setup, snapshot: Snapshot) -> bool:
-    """The terminator psi: every assertion decided, or the horizon with none pending."""
-    for assertion in setup.assertions:
-        if not assertion.decided:
-            break
-    else:
-        return True
-    left = setup.scenario.end - snapshot.time
-    if left > 1e-9:
-        return False
-    return left < -OVERTIME_S or not any(a.pending for a in setup.assertions)
-
-
-def _at_end(scene: Scene, snapshot: Snapshot) -> bool:
-    """Whether a freely driving ego has reached the end of its path."""
-    ego, path = snapshot.ego, scene.ego_path
-    return path.project(ego.x, ego.y).along >= path.length - ego.body.kind.length / 2
 
 
 def _finished(

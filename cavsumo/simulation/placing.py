@@ -8,6 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from cavsumo.agents.base import Agent
+from cavsumo.errors import InputError
 from cavsumo.model.bodies import Kind
 from cavsumo.model.carriageway import Start, StartRecord
 from cavsumo.model.snapshot import BodyState, Snapshot
@@ -76,6 +77,10 @@ def _told(setup: Setup, records: Sequence[Sequence[StartRecord]]) -> Starts:
         for team, own in zip(setup.teams, records, strict=True)
         for body, record in zip(team, own, strict=bool(own))
     }
+    if found and len(found) != len(setup.bodies):
+        raise InputError(
+            f"starts of {len(found)} testers are recorded, expected {len(setup.bodies)}"
+        )
     return tuple(found[body] for body in sorted(found))
 
 

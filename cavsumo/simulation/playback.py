@@ -13,7 +13,8 @@ from cavsumo.agents.recorded import Recorded, RecordedAgent
 from cavsumo.model.bodies import Action
 from cavsumo.model.departures import Demand
 from cavsumo.network.recorded_starts import start_record
-from cavsumo.simulation.loop import Episode, EpisodeLoop, Joint, played_on
+from cavsumo.simulation.episode import Episode, Joint
+from cavsumo.simulation.loop import EpisodeLoop, played_on
 from cavsumo.simulation.setup import Setup
 
 
@@ -24,7 +25,7 @@ def recorded(setup: Setup, episode: Episode, seed: int, departures: Demand | Non
     """
     return Recorded(
         seed,
-        [by_body(setup, joint) for joint in episode.actions],
+        by_body(setup, episode.actions),
         [start_record(setup.site, start) for start in episode.starts],
         [start_record(setup.site, start) for start in episode.waited],
         departures,
@@ -32,14 +33,18 @@ def recorded(setup: Setup, episode: Episode, seed: int, departures: Demand | Non
     )
 
 
-def by_body(setup: Setup, joint: Joint) -> tuple[Action, ...]:
-    """The actions of all agents in one timestep, in the order of the bodies."""
-    found = {
-        body: Action(*action)
-        for team, actions in zip(setup.teams, joint, strict=True)
-        for body, action in zip(team, actions, strict=True)
-    }
-    return tuple(found[body] for body in sorted(found))
+def by_body(setup: Setup, joints: Sequence[Joint]) -> list[tuple[Action, ...]]:
+    """The actions of all agents in each timestep, in the order of the bodies."""
+    owners = sorted(
+        (body, agent, i) for agent, team in enumerate(setup.teams) for i, body in enumerate(team)
+    )
+    places = [(agent, i) for _, agent, i in owners]
+    return [tuple([_action(joint[agent][i]) for agent, i in places]) for joint in joints]
+
+
+def _action(chosen: Sequence[float]) -> Action:
+    """A pair that an agent chose."""
+    return chosen if isinstance(chosen, Action) else Action(*chosen)
 
 
 def doing(actions: Sequence[Joint], teams: int) -> list[RecordedAgent]:

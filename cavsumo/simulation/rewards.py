@@ -33,7 +33,7 @@ class RewardMonitor:
         self._over = False
         self._names = {body.id for body in scene.bodies}
         # Whether a body is on the carriageway, the place of that check, and the distance from there
-        # within which it cannot change: checks are expensive, so the next one waits until then.
+        # within which it cannot change.
         self._on_road = [False] * len(scene.bodies)
         self._known = [(math.inf, math.inf, 0.0)] * len(scene.bodies)
         self._seen: tuple[BodyState, ...] = ()
@@ -49,10 +49,12 @@ class RewardMonitor:
         testers, on_road = successor.testers, self._on_road
         if testers is not self._seen:
             self._seen = testers
-            for i, body in enumerate(testers):
-                x, y, leeway = self._known[i]
-                if math.hypot(body.x - x, body.y - y) >= leeway:
-                    self._look_up(i, body)
+            if self._roads is not None:
+                for i, (_, here_x, here_y, _, _) in enumerate(testers):
+                    x, y, room = self._known[i]
+                    if math.hypot(here_x - x, here_y - y) >= room and (here_x, here_y) != (x, y):
+                        on_road[i], room = self._roads.on_carriageway.at(here_x, here_y)
+                        self._known[i] = here_x, here_y, room
         walking = True in on_road
         if walking:
             self.cost += self._dt * sum(on_road)
@@ -81,11 +83,3 @@ class RewardMonitor:
         rewards = [-self._dt * TIME_COST for _ in self._teams]
         self.total += math.fsum(rewards)
         return rewards, True
-
-    def _look_up(self, i: int, body: BodyState) -> None:
-        """Check whether a body's centre is on the carriageway."""
-        if self._roads is None:
-            self._known[i] = (body.x, body.y, math.inf)
-            return
-        self._on_road[i] = self._roads.contains(body.x, body.y)
-        self._known[i] = (body.x, body.y, self._roads.edge_distance(body.x, body.y))

@@ -12,7 +12,6 @@ from cavsumo.assertions.base import Assertion
 from cavsumo.egos.base import Ego
 from cavsumo.model.carriageway import Start
 from cavsumo.model.departures import Demand
-from cavsumo.model.scenario import Simulation
 from cavsumo.model.scene import Scene
 from cavsumo.model.seeds import starts_generator
 from cavsumo.model.sensors import Senses
@@ -26,7 +25,6 @@ def started(
     agents: Sequence[Agent],
     seed: int,
     record: bool,
-    simulation: Simulation,
     demand: Demand | None,
 ) -> tuple[Scene, Senses | None, Placed, list[np.random.Generator]]:
     """Place the testers and begin an episode; one generator for each who draws."""
@@ -41,9 +39,7 @@ def started(
 
     def reset(states: Sequence[BodyState], starts: Sequence[Start]) -> Snapshot:
         shown = {"everything": everything, "note": record}
-        return setup.world.reset(
-            seed, states, starts, simulation=simulation, demand=demand, **shown
-        )
+        return setup.world.reset(seed, states, starts, demand=demand, **shown)
 
     begun = placed(setup, agents, placing, reset)
     ego = setup.world.ego_body

@@ -28,12 +28,14 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Callable, Sequence
+from functools import lru_cache
 from itertools import pairwise
 from typing import Any, NamedTuple
 
 from cavsumo.errors import SimulationError
 from cavsumo.model.bodies import Body, Kind
 from cavsumo.model.snapshot import AROUND_M, BodyState, RawState
+from cavsumo.sumo.calls import direct
 from cavsumo.sumo.poses import RADIANS
 
 ROUNDING_M = 1e-6  # added to every stride; far above the rounding of any coordinate
@@ -120,16 +122,18 @@ class Sighting:
 
     Attributes:
         body: the body.
+        half: half its length [m].
         forward: largest distance of a point of its box from the middle of its front edge [m].
         tame: whether the bound of the module holds for it.
         due: the reading of the lookout's odometer from which on it may touch a watcher [m].
         x, y, step: where and when its front was last read.
     """
 
-    __slots__ = ("body", "due", "forward", "step", "tame", "x", "y")
+    __slots__ = ("body", "due", "forward", "half", "step", "tame", "x", "y")
 
     def __init__(self, body: Body, tame: bool) -> None:
         self.body, self.tame = body, tame
+        self.half = body.kind.length / 2
         self.forward = math.hypot(body.kind.length, body.kind.width / 2)
         self.due = -math.inf
         self.x = self.y = 0.0
@@ -152,6 +156,8 @@ class Lookout:
         restless: Callable[[str], bool],
     ) -> None:
         self._domain, self._mine, self._dt, self._restless = domain, mine, dt, restless
+        self._position = direct(domain, "getPosition")
+        self._angle, self._speed = direct(domain, "getAngle"), direct(domain, "getSpeed")
         self._everything = roaming is None
         self._roaming = roaming or Roaming()
         self._ids: tuple[str, ...] = ()
@@ -169,7 +175,7 @@ class Lookout:
         if ids != self._ids:
             self._muster(ids)
         if self._everything:
-            return [self._look(other) for other in self._others]
+            return self._looked(self._others)
         if self._odometer < self._due:
             return []
         now, due = self._odometer, math.inf
@@ -180,7 +186,7 @@ class Lookout:
             if other.due < due:
                 due = other.due
         self._due = due
-        return [self._look(other) for other in near]
+        return self._looked(near)
 
     def _muster(self, ids: tuple[str, ...]) -> None:
         """Register new bodies, which are read at once, and remove those that left."""
@@ -194,8 +200,7 @@ class Lookout:
         """A body seen for the first time."""
         domain = self._domain
         length, width = domain.getLength(body_id), domain.getWidth(body_id)
-        name = str(domain.getVehicleClass(body_id))
-        kind = Kind(name, length, width, 2 * length / 3, 0.0, math.inf, -math.inf, math.inf, 0.0)
+        kind = _kind(str(domain.getVehicleClass(body_id)), length, width)
         if not self._everything:
             roaming, top = self._roaming, domain.getMaxSpeed(body_id)
             stride = top * self._dt * roaming.stretch + roaming.leap + ROUNDING_M
@@ -204,10 +209,10 @@ class Lookout:
 
     def _near(self, other: Sighting, watchers: Sequence[BodyState]) -> bool:
         """Read a body: whether it may touch a watcher now, and if not, when to read it next."""
-        x, y = self._domain.getPosition(other.body.id)
-        gap = math.inf
+        x, y = self._position(other.body.id)
+        gap, hypot = math.inf, math.hypot
         for body, there_x, there_y, _, _ in watchers:
-            distance = math.hypot(x - there_x, y - there_y) - body.kind.reach
+            distance = hypot(x - there_x, y - there_y) - body.kind.reach
             if distance < gap:
                 gap = distance
         gap -= other.forward + AROUND_M
@@ -225,17 +230,32 @@ class Lookout:
                 name = other.body.id
                 raise SimulationError(f"{name} jumped: {way:.1f} m in {steps} timesteps")
 
-    def _look(self, other: Sighting) -> RawState:
-        """A body's state as SUMO has it."""
-        body, domain = other.body, self._domain
+    def _looked(self, others: Sequence[Sighting]) -> list[RawState]:
+        """The states of bodies as SUMO has them."""
         # from_sumo, written out: with everything read this is the innermost loop of a timestep
-        x, y = domain.getPosition(body.id)
-        o = (90.0 - domain.getAngle(body.id)) * RADIANS
-        if o <= -math.pi:
-            o += 2 * math.pi
-        half = body.kind.length / 2
-        speed = domain.getSpeed(body.id)
-        return (body, x - half * math.cos(o), y - half * math.sin(o), speed, o)
+        position, angle, speed, cos, sin = (
+            self._position,
+            self._angle,
+            self._speed,
+            math.cos,
+            math.sin,
+        )
+        found = []
+        for other in others:
+            body = other.body
+            name, half = body.id, other.half
+            x, y = position(name)
+            o = (90.0 - angle(name)) * RADIANS
+            if o <= -math.pi:
+                o += 2 * math.pi
+            found.append((body, x - half * cos(o), y - half * sin(o), speed(name), o))
+        return found
+
+
+@lru_cache(maxsize=1000)
+def _kind(name: str, length: float, width: float) -> Kind:
+    """The kind of a background body; there are few, and many bodies."""
+    return Kind(name, length, width, 2 * length / 3, 0.0, math.inf, -math.inf, math.inf, 0.0)
 
 
 def _rides(persons: Any, body_id: str, roaming: Roaming | None) -> bool:

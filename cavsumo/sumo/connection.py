@@ -1,4 +1,7 @@
-"""SUMO's simulation: one for each episode, or one for several episodes.
+"""SUMO's simulation, one for each episode: started for it, or begun in one that stands by.
+
+A simulation that stands by has been started, and nothing else. In forks of its process it becomes
+the simulations of many episodes, with the same bits as if each had been started.
 
 It calls SUMO through given functions, so that ``world`` stays the one boundary.
 """
@@ -12,12 +15,17 @@ from typing import Any
 from cavsumo.egos.base import Ego
 from cavsumo.errors import SimulationError
 from cavsumo.model.departures import Attributes, Demand
-from cavsumo.model.scenario import Scenario, Simulation
+from cavsumo.model.scenario import Scenario
 from cavsumo.network.site import Site
-from cavsumo.sumo.demand import BEYOND_S, Departures, Lights, cleared, noted, types_only
+from cavsumo.sumo.calls import direct
+from cavsumo.sumo.late_routes import LateRoutes, refusal
+from cavsumo.sumo.native import Library
 from cavsumo.sumo.options import OPTIONS
 from cavsumo.sumo.recorded_demand import route_file, types_told
+from cavsumo.sumo.reseeding import reseed
 from cavsumo.sumo.vehicle_types import type_file
+
+STANDING_BY_SEED = 1  # of no episode: all generators are seeded anew
 
 
 class Simulations:
@@ -29,52 +37,69 @@ class Simulations:
 
     Attributes:
         routes: the file of the background demand, None for empty roads.
+        stood_by: whether the present one had stood by, so that another start costs much more.
     """
 
     def __init__(self, sumo: Any, scenario: Scenario, site: Site, ego: Ego, folder: Path) -> None:
         self._sumo, self._scenario, self._site = sumo, scenario, site
+        self._step = direct(sumo.simulation, "step")
         self._types = folder / "types.add.xml"
         self._types.write_text(type_file(scenario, ego), encoding="utf-8")
-        self._kept = folder / "kept.add.xml"  # what stays of the demand when we send it ourselves
+        self._stands_by = self.stood_by = False
+        self._late: LateRoutes | None = None
         self._recorded = folder / "recorded.rou.xml"  # departures that are played back
         self._net, self.routes = scenario.net_file, scenario.routes_file
         if site.demand is not None:
             self.routes = folder / "traffic.rou.xml"
             self.routes.write_text(site.demand, encoding="utf-8")
-        self._demand: Demand | None = None
-        self._departures: Departures | None = None
 
-    def begin(self, seed: int, simulation: Simulation, demand: Demand | None = None) -> None:
-        """Start SUMO, or put it back to how it was when it started (``World.reset``).
-
-        ``demand``: recorded departures in place of the scenario's demand, in a simulation of their
-        own.
-        """
-        if simulation == "same" and self._departures is not None:
-            cleared(self._sumo)
-            self._lights.restore()
-            self._departures.begin()
-            return
-        self._departures = None
+    def stand_by(self) -> None:
+        """Start SUMO for the next episode, before its seed is known."""
         self._sumo.close()
-        if simulation == "own":
-            routes = self.routes
-            if demand is not None:
-                routes = self._recorded
-                routes.write_text(route_file(demand), encoding="utf-8")
-            self._sumo.start(self.command(seed, routes))
-            self.set_light()
+        self._sumo.start(self.command(STANDING_BY_SEED, None))
+        # SUMO makes tables of all walking areas and of all edges when they are first asked for.
+        self._sumo.person.getIDList()
+        self._sumo.simulation.convertRoad(0.0, 0.0)
+        self._stands_by = True
+
+    def lose(self) -> None:
+        """Note that somebody else has started a simulation in this process meanwhile."""
+        self._stands_by = False
+
+    @cached_property
+    def stand_by_refusal(self) -> str:
+        """The reason why no simulation can stand by, as a clause; empty if one can."""
+        if not Library(self._sumo).complete:
+            return "this build of libsumo cannot seed a running simulation"
+        return refusal(self.routes, self._scenario.additional_files)
+
+    def begin(self, seed: int, demand: Demand | None = None) -> None:
+        """Start SUMO, unless it stands by (``World.reset``).
+
+        ``demand``: recorded departures in place of the scenario's demand.
+        """
+        routes = self.routes
+        if demand is not None:
+            routes = self._recorded
+            routes.write_text(route_file(demand), encoding="utf-8")
+        self.stood_by, self._stands_by, self._late = self._stands_by, False, None
+        if self.stood_by:
+            reseed(self._sumo, seed)
+            if routes is not None:
+                self._late = LateRoutes(self._sumo, routes)
         else:
-            self._start_shared(seed)
+            self._sumo.close()
+            self._sumo.start(self.command(seed, routes))
+        self.set_light()
         route = self._site.route
         self._sumo.route.add("cavsumo_ego", list(route.edges))
         self._sumo.route.add("cavsumo_tester", [route.edges[0]])
 
     def advance(self) -> None:
         """One timestep of SUMO."""
-        if self._departures is not None:
-            self._departures.send()
-        self._sumo.simulationStep()
+        if self._late is not None:
+            self._late.read()
+        self._step(0.0)
 
     def set_light(self) -> None:
         """Set the first traffic light on the ego's route to its required phase."""
@@ -96,33 +121,12 @@ class Simulations:
         return types_told(self.routes, self._scenario.additional_files)
 
     def command(self, seed: int, routes: Path | None) -> list[str]:
-        """The command line of SUMO; without routes the types of a demand that is sent by us."""
+        """The command line of SUMO; ``routes``: the route file, None for none."""
         scenario = self._scenario
         more = [*scenario.additional_files, self._types]
-        if routes is None and self._kept.exists():
-            more.append(self._kept)
         files = ["-n", str(self._net), "-a", ",".join(str(f) for f in more)]
         if routes is not None:
             files += ["-r", str(routes)]
         options = [word for k, v in OPTIONS.items() for word in (f"--{k}", v)]
         clock = ["--step-length", f"{scenario.step_length:g}", "--seed", str(seed % 2**31)]
         return ["sumo", *files, *options, *clock]
-
-    def _start_shared(self, seed: int) -> None:
-        """Start SUMO without the demand, which each episode then sends by itself."""
-        if self._demand is None:
-            self._demand = self._noted()
-        self._sumo.start(self.command(seed, None))
-        self.set_light()
-        self._lights = Lights(self._sumo)
-        self._departures = Departures(self._sumo, self._demand, self._scenario.step_length)
-
-    def _noted(self) -> Demand:
-        """The demand, as SUMO carries it out without ego and testers."""
-        if self.routes is None:
-            return Demand()
-        self._kept.write_text(types_only(self.routes), encoding="utf-8")
-        self._sumo.start(self.command(1, self.routes))
-        demand = noted(self._sumo, self._scenario.end + BEYOND_S)
-        self._sumo.close()
-        return demand

@@ -51,9 +51,9 @@ def types_told(routes: Path | None, additional: Iterable[Path]) -> dict[str, Att
         additional: SUMO's additional files, from which nobody may enter.
     """
     try:
-        if any(element.tag in ENTERING for file in additional for element in _elements(file)):
+        if any(element.tag in ENTERING for file in additional for element in elements(file)):
             return None
-        return _types(_elements(routes)) if routes is not None else {}
+        return _types(elements(routes)) if routes is not None else {}
     except (ElementTree.ParseError, ValueError, LookupError):
         return None  # SUMO reads it and Python does not
 
@@ -71,7 +71,7 @@ def _types(elements: Iterable[Any]) -> dict[str, Attributes] | None:
     return types
 
 
-def _elements(file: Path) -> Iterator[Any]:
+def elements(file: Path) -> Iterator[Any]:
     """All elements of a file below its root, each once it is complete; the file may be packed."""
     with gzip.open(file) if file.suffix == ".gz" else file.open("rb") as stream:
         events = ElementTree.iterparse(stream, events=("start", "end"))

@@ -9,43 +9,35 @@ Each process has one simulation, as libsumo requires.
 
 from __future__ import annotations
 
-import math
 import os
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
 from pathlib import Path
-from tempfile import TemporaryDirectory
+from tempfile import TemporaryDirectory, TemporaryFile
 from typing import Any
 
 import libsumo
 import shapely
 
-from cavsumo.egos.base import Acceleration, Command, Drive, Ego
-from cavsumo.errors import EgoError, NoSuchAction, SimulationError, SimulationTaken
-from cavsumo.model.bodies import PEDESTRIAN, Body
+from cavsumo.egos.base import Command, Ego
+from cavsumo.errors import SimulationError, SimulationTaken
+from cavsumo.model.bodies import Body
 from cavsumo.model.carriageway import Start
 from cavsumo.model.departures import Demand
-from cavsumo.model.geometry import Box, gap
-from cavsumo.model.kinematics import steering_for_turn, step_floats, wrap
-from cavsumo.model.scenario import Scenario, Simulation
+from cavsumo.model.scenario import Scenario
 from cavsumo.model.snapshot import BodyState, RawState, Snapshot
 from cavsumo.network.site import Site
 from cavsumo.sumo.background import Background, Roaming, roaming
+from cavsumo.sumo.calls import direct
 from cavsumo.sumo.connection import Simulations
-from cavsumo.sumo.demand import DepartureNotes
-from cavsumo.sumo.poses import from_sumo, front
+from cavsumo.sumo.departure_notes import DepartureNotes
+from cavsumo.sumo.ego_in_sumo import EgoInSumo
+from cavsumo.sumo.light_letters import LightLetters
+from cavsumo.sumo.moved_bodies import EGO, MovedBodies, make_room
 from cavsumo.sumo.reseeding import reseed
 
-EGO = "ego"
 ENTRY_S = 30.0  # longest wait of the ego for room to enter the network
 PROMPT_S = 1.0  # after a longer wait of the ego the traffic light is set once more
-KEEP_EXACT = 2  # moveToXY: exactly there, on the network or off it
-KEEP_EXACT_ANY_LANE = 6  # the same for persons, on lanes for cars too
-# moveToXY looks for lanes within this distance only; SUMO's default of 100 m costs ten times as
-# much per call for a body off the road, and no lane is wider than twice this.
-MATCH_M = 5.0
-ROOM_M = 2.0  # traffic nearer to a tester vehicle than this at the start is removed
-UNSAFE = 0  # setSpeedMode: none of SUMO's checks changes the commanded speed
 # The world that has the one simulation of this process: the one that last began an episode.
 _PLAYING: list[object] = [None]
 
@@ -69,16 +61,23 @@ class World:
         self._persons = scenario.embodiment == "person"
         self._folder = TemporaryDirectory(prefix="cavsumo-")
         folder = Path(self._folder.name)
-        self._heard = (folder / "stderr.log").open("ab")
         self.simulations = Simulations(libsumo, scenario, site, ego, folder)
         self._roaming: Roaming | None = None
         self.begun = 0
         self._calls: list[tuple[str, tuple[Any, ...]]] = []  # what ``again`` does again
         self._mark = object()  # stands for this world in _PLAYING without keeping it alive
         shapely.prepare(site.crossings)
-        self._walks = [crossing.light for crossing in site.marked]
-        # Each light is asked once a timestep, however many of its links matter.
-        self._lights = {light.id for light in site.lights} | {w[0] for w in self._walks if w}
+        self._lights = LightLetters(site)
+        self._vehicle_ids = direct(libsumo.vehicle, "getIDList")
+        self._person_ids = direct(libsumo.person, "getIDList")
+        self._events = tuple(
+            direct(libsumo.simulation, name)
+            for name in (
+                "getCollisions",
+                "getStartingTeleportIDList",
+                "getEmergencyStoppingVehiclesIDList",
+            )
+        )
 
     def __enter__(self) -> World:
         return self
@@ -91,7 +90,6 @@ class World:
         if _PLAYING[0] in (None, self._mark):
             libsumo.close()
             _PLAYING[0] = None
-        self._heard.close()
         self._folder.cleanup()
 
     def reset(
@@ -101,7 +99,6 @@ class World:
         starts: Sequence[Start],
         *,
         everything: bool = True,
-        simulation: Simulation = "own",
         demand: Demand | None = None,
         note: bool = False,
     ) -> Snapshot:
@@ -109,19 +106,17 @@ class World:
         starts.
 
         Args:
-            simulation: "own" starts SUMO afresh, for the same bits after any history; "new"
-                starts one that serves several episodes, of which the later ones say "same".
             everything: show the whole background in every snapshot; else only those who may touch
                 the ego or a tester, which is all that contacts need.
             demand: departures that were noted in another episode, in place of the scenario's own
-                demand; only in an own simulation.
+                demand.
             note: note who departs (``departures``).
 
         Raises SimulationError with SUMO's message if SUMO refuses, or if the ego finds no room to
         enter.
         """
         self.begun += 1
-        how = everything, simulation, demand, note
+        how = everything, demand, note
         self._calls = [("_begin", (seed, tuple(states), tuple(starts), *how))]
         return self._begin(seed, states, starts, *how)
 
@@ -131,44 +126,47 @@ class World:
         states: Sequence[BodyState],
         starts: Sequence[Start],
         everything: bool,
-        simulation: Simulation,
         demand: Demand | None,
         note: bool,
     ) -> Snapshot:
         """Begin an episode, see ``reset``."""
         self.collisions: set[tuple[str, str]] = set()
         self.teleports = self.emergency_stops = 0
-        self._driven: BodyState | None = None
-        self._told: dict[str, tuple[BodyState, tuple[float, float, float]]] = {}
-        self._step, self._steering = 0, 0.0
-        self._commanded = False
+        self._moved = MovedBodies(self.site, self.ego, persons=self._persons)
+        self._ego = EgoInSumo(self.ego_body, self._moved, self.dt)
+        self._step = 0
         self._vehicles: tuple[str, ...] = ()
         self._departures: DepartureNotes | None = None
-        if simulation == "same":
-            self._check_own()
+        if _PLAYING[0] is not self._mark:
+            self.simulations.lose()
         _PLAYING[0] = self._mark
         with self._listening():
-            self.simulations.begin(seed, simulation, demand)
+            self.simulations.begin(seed, demand)
             if note:
                 self._departures = self._notes(demand, states)
-            self._insert(states, starts)
-            ego = self._enter(states)
-            self._make_room(states, starts)
-        self._ego, self._states = ego, tuple(states)
+            self._moved.insert(states, starts)
+            self._enter(states)
+            self._vehicles = tuple(make_room(self._vehicles, states, starts))
+        self._states = tuple(states)
         self._everything = everything
-        self._background = self._lookout(everything, (ego, *states))
-        return self._snapshot(ego, tuple(states))
+        self._background = self._lookout(everything)
+        return self._snapshot()
+
+    def stand_by(self) -> None:
+        """Start SUMO for the next episode before its seed is known; see ``connection``."""
+        _PLAYING[0] = self._mark
+        with self._listening():
+            self.simulations.stand_by()
+
+    @property
+    def lanes(self) -> int:
+        """How many lanes the network has in SUMO, junctions included."""
+        return int(libsumo.lane.getIDCount())
 
     @property
     def told(self) -> int:
         """How many calls have led here from the beginning of the episode."""
         return len(self._calls)
-
-    @property
-    def repeatable(self) -> bool:
-        """Whether the simulation belongs to this episode alone, so that its past is known."""
-        (_, (*_, simulation, _, _)), *_ = self._calls
-        return bool(simulation == "own")
 
     def again(self, told: int) -> Snapshot | None:
         """Bring a new simulation to an earlier moment of the episode, by telling it the same.
@@ -178,7 +176,6 @@ class World:
 
         Returns the last snapshot of then, with the same bits if SUMO does the same again.
         """
-        assert self.repeatable
         self._calls = self._calls[:told]
         snapshot: Snapshot | None = None
         for name, arguments in tuple(self._calls):
@@ -196,14 +193,14 @@ class World:
         """This moment with the whole background, which is shown from now on."""
         if not self._everything:
             self._everything = True
-            self._background = self._lookout(True, (self._ego, *self._states))
-        return self._snapshot(self._ego, self._states)
+            self._background = self._lookout(True)
+        return self._snapshot()
 
     def everybody(self) -> tuple[RawState, ...]:
         """All bodies but the ego and the testers, at any distance."""
-        watchers = (self._ego, *self._states)
+        watchers = (self._ego.state, *self._states)
         background = Background(libsumo.vehicle, libsumo.person, None, self.dt, watchers)
-        return background.read(self._vehicles, libsumo.person.getIDList(), watchers)
+        return background.read(self._vehicles, self._person_ids(), watchers)
 
     def shift(self, states: tuple[BodyState, ...]) -> Snapshot:
         """The first snapshot once more, with the testers elsewhere; before any timestep."""
@@ -213,7 +210,7 @@ class World:
     def _shift(self, states: tuple[BodyState, ...]) -> Snapshot:
         """The first snapshot with the testers elsewhere."""
         self._states = states
-        return self._snapshot(self._ego, states)
+        return self._snapshot()
 
     def step(self, states: tuple[BodyState, ...], command: Command) -> Snapshot | None:
         """Advance one timestep; None when the ego has left the network.
@@ -232,20 +229,18 @@ class World:
         if _PLAYING[0] is not self._mark:
             self._check_own()
         try:
-            self._place(states)
-            self._command_ego(command)
+            self._moved.place(states)
+            self._ego.command(command)
             self._advance()
             self._collect_events()
-            ego = self._read_ego() if self._driven is None else self._driven
+            ego = self._ego.follow(self._vehicles)
         except (libsumo.TraCIException, libsumo.FatalTraCIError) as error:
             raise SimulationError(f"SUMO: {error}") from error
         self._step += 1
         if ego is None:
             return None
-        if self._driven is None:
-            self._steering = self._implied_steering(ego)
-        self._ego, self._states = ego, states
-        return self._snapshot(ego, states)
+        self._states = states
+        return self._snapshot()
 
     def _check_own(self) -> None:
         """Refuse to continue in a simulation that another world has taken or closed."""
@@ -258,122 +253,36 @@ class World:
     @contextmanager
     def _listening(self) -> Iterator[None]:
         """Turn SUMO's refusals into SimulationError with the message that it prints on stderr."""
-        with suppress(OSError):  # in a fork it leads nowhere
-            self._heard.truncate(0)
         stderr = os.dup(2)
-        os.dup2(self._heard.fileno(), 2)
-        try:
-            yield
-        except (libsumo.TraCIException, libsumo.FatalTraCIError) as error:
-            words = Path(self._heard.name).read_text(errors="replace") or str(error)
-            lines = [" ".join(line.split()) for line in words.splitlines()]
-            said = [line for line in lines if line and not line.startswith("Quitting")]
-            raise SimulationError("SUMO: " + " ".join(dict.fromkeys(said[:4]))) from error
-        finally:
-            os.dup2(stderr, 2)
-            os.close(stderr)
+        with TemporaryFile() as heard:
+            os.dup2(heard.fileno(), 2)
+            try:
+                yield
+            except (libsumo.TraCIException, libsumo.FatalTraCIError) as error:
+                heard.seek(0)
+                words = heard.read().decode(errors="replace") or str(error)
+                lines = [" ".join(line.split()) for line in words.splitlines()]
+                said = [line for line in lines if line and not line.startswith("Quitting")]
+                raise SimulationError("SUMO: " + " ".join(dict.fromkeys(said[:4]))) from error
+            finally:
+                os.dup2(stderr, 2)
+                os.close(stderr)
 
-    # Bodies in SUMO
-
-    def _insert(self, states: Sequence[BodyState], starts: Sequence[Start]) -> None:
-        """Add the ego and the testers, each at its place before the first timestep."""
-        route = self.site.route
-        speed = self.ego.depart_speed
-        libsumo.vehicle.add(
-            EGO,
-            "cavsumo_ego",
-            typeID="cavsumo_ego",
-            departLane=str(route.lane),
-            departPos=f"{route.depart_m}",
-            departSpeed="max" if speed is None else f"{speed}",
-            arrivalPos=f"{route.arrive_m}",
-        )
-        for state, start in zip(states, starts, strict=True):
-            if self._is_person(state):
-                edges = start.walk or route.edges
-                libsumo.person.add(state.id, edges[0], 0.0, typeID="cavsumo_person")
-                libsumo.person.appendWalkingStage(state.id, list(edges), 0.0)
-            else:
-                kind = state.body.kind.name
-                libsumo.vehicle.add(state.id, _route_of(start), typeID=f"cavsumo_{kind}")
-        self._place(states)
-
-    def _enter(self, states: Sequence[BodyState]) -> BodyState:
+    def _enter(self, states: Sequence[BodyState]) -> None:
         """Step until the ego has entered; the testers wait meanwhile."""
         for waited in range(max(2, round(ENTRY_S / self.dt))):
             self._advance()
-            ego = self._read_ego()
+            ego = self._ego.found(self._vehicles)
             if ego is not None:
                 if waited * self.dt > PROMPT_S:
                     self.simulations.set_light()  # the light went on while the ego waited
-                for state in states:
-                    if not self._is_person(state):
-                        libsumo.vehicle.setSpeedMode(state.id, UNSAFE)
-                return ego
-            self._place(states)
+                self._moved.entered(states)
+                self._ego.state = ego
+                return
+            self._moved.place(states)
         raise SimulationError(
             f"the ego found no room to enter edge {self.site.route.edges[0]!r} in {ENTRY_S:g} s"
         )
-
-    def _make_room(self, states: Sequence[BodyState], starts: Sequence[Start]) -> None:
-        """Remove traffic that SUMO inserted at the place of a tester vehicle.
-
-        Departures of the first timestep are inserted before the testers.
-        """
-        boxes = [s.box for s, start in zip(states, starts, strict=True) if start.approach]
-        mine = {EGO, *(s.id for s in states)}
-        if not boxes:
-            return
-        for name in self._vehicles:
-            length, width = libsumo.vehicle.getLength(name), libsumo.vehicle.getWidth(name)
-            x, y = libsumo.vehicle.getPosition(name)
-            pose = from_sumo(x, y, libsumo.vehicle.getAngle(name), length)
-            if name not in mine and min(gap(Box(*pose, length, width), b) for b in boxes) < ROOM_M:
-                libsumo.vehicle.remove(name)
-        self._vehicles = libsumo.vehicle.getIDList()
-
-    def _is_person(self, state: BodyState) -> bool:
-        """Whether a body is a person in SUMO; only pedestrians can be."""
-        return self._persons and state.body.kind.name == PEDESTRIAN.name
-
-    def _place(self, states: Sequence[BodyState]) -> None:
-        """Send SUMO the testers' positions; in every timestep, or it moves them itself."""
-        move, told = libsumo.vehicle.moveToXY, self._told
-        for state in states:
-            name = state.body.id
-            known = told.get(name)
-            # A body that stands keeps its very record, and SUMO the speed that it was told.
-            fresh = known is None or known[0] is not state
-            if known is None or fresh:
-                known = told[name] = state, front(state)
-            x, y, angle = known[1]
-            if self._persons and self._is_person(state):
-                on_crossing = shapely.contains_xy(self.site.crossings, x, y)
-                keep = KEEP_EXACT if on_crossing else KEEP_EXACT_ANY_LANE
-                libsumo.person.moveToXY(name, "", x, y, angle, keep, MATCH_M)
-                continue
-            move(name, "", -1, x, y, angle, KEEP_EXACT, MATCH_M)
-            if fresh:  # followers would else see a speed that SUMO infers, wrong by up to 6 m/s
-                libsumo.vehicle.setSpeed(name, state.v)
-
-    def _command_ego(self, command: Command) -> None:
-        """Pass on the ego's command; None leaves the ego to SUMO."""
-        if command is None:
-            return
-        if not self._commanded:  # its first command may come late, when another driver takes over
-            self._commanded = True
-            libsumo.vehicle.setSpeedMode(EGO, UNSAFE)
-        ego, kind = self._ego, self.ego_body.kind
-        if isinstance(command, Acceleration):
-            if self._driven is not None:
-                raise EgoError("an ego that steers itself cannot be handed to one that does not")
-            v = min(kind.v_max, max(kind.v_min, ego.v + command.value * self.dt))
-            libsumo.vehicle.setSpeed(EGO, v)
-        elif isinstance(command, Drive):
-            state = step_floats(*ego[1:], *command, kind.wheelbase, kind.v_min, kind.v_max, self.dt)
-            self._driven = BodyState(self.ego_body, *state)
-            self._steering = command.steering
-            self._place([self._driven])
 
     # Reading from SUMO
 
@@ -395,68 +304,29 @@ class World:
         self.simulations.advance()
         if notes is not None:
             notes.add(libsumo, now)
+        self._vehicles = self._vehicle_ids()
 
-    def _read_ego(self) -> BodyState | None:
-        """The ego as SUMO moves it; None before it entered and after it left."""
-        vehicle = libsumo.vehicle
-        self._vehicles = vehicle.getIDList()
-        if EGO not in self._vehicles:
-            return None
-        x, y = vehicle.getPosition(EGO)
-        x, y, o = from_sumo(x, y, vehicle.getAngle(EGO), self.ego_body.kind.length)
-        return BodyState(self.ego_body, x, y, vehicle.getSpeed(EGO), o)
-
-    def _implied_steering(self, ego: BodyState) -> float:
-        """The steering angle that the ego's last turn implies (seed, eq. 22), within its limits.
-
-        SUMO turns a vehicle as its lane bends, also more sharply than its axles could.
-        """
-        kind, before = ego.body.kind, self._ego
-        if ego.o == before.o:
-            return 0.0
-        turn = wrap(ego.o - before.o)
-        try:
-            steering = steering_for_turn(ego.v, turn, kind.wheelbase, self.dt) if turn else 0.0
-        except NoSuchAction:
-            return math.copysign(kind.steering_max, turn) if ego.v > 0 else 0.0
-        return min(kind.steering_max, max(-kind.steering_max, steering))
-
-    def _snapshot(self, ego: BodyState, states: tuple[BodyState, ...]) -> Snapshot:
+    def _snapshot(self) -> Snapshot:
         """The state at this moment, with SUMO's background."""
-        if self._driven is not None:
-            self._vehicles = libsumo.vehicle.getIDList()
-        persons = libsumo.person.getIDList()
-        raw = self._background.read(self._vehicles, persons, (ego, *states))
-        time = round(self._step * self.dt, 6)
-        shown = {name: libsumo.trafficlight.getRedYellowGreenState(name) for name in self._lights}
-        lights = tuple([shown[light.id][light.link] for light in self.site.lights])
-        crossings = tuple([shown[walk[0]][walk[1]] if walk else "" for walk in self._walks])
-        return Snapshot(
-            self._step, time, ego, self._steering, states, raw, lights, crossing_lights=crossings
-        )
+        ego, states, step = self._ego.state, self._states, self._step
+        raw = self._background.read(self._vehicles, self._person_ids(), (ego, *states))
+        lights, crossings = self._lights.read()
+        time, steering = round(step * self.dt, 6), self._ego.steering
+        return Snapshot(step, time, ego, steering, states, raw, lights, None, crossings)
 
-    def _lookout(self, everything: bool, watchers: Sequence[BodyState]) -> Background:
+    def _lookout(self, everything: bool) -> Background:
         """The background of this episode; the network is measured at the first use."""
         if not everything and self._roaming is None:
             self._roaming = roaming(libsumo.lane)
         free = None if everything else self._roaming
+        watchers = (self._ego.state, *self._states)
         return Background(libsumo.vehicle, libsumo.person, free, self.dt, watchers)
 
     def _collect_events(self) -> None:
         """SUMO's own reports, kept beside ours and never merged."""
-        simulation = libsumo.simulation
-        for collision in simulation.getCollisions():
+        collisions, teleports, stops = self._events
+        for collision in collisions():
             a, b = sorted((collision.collider, collision.victim))
             self.collisions.add((a, b))
-        self.teleports += len(simulation.getStartingTeleportIDList())
-        self.emergency_stops += len(simulation.getEmergencyStoppingVehiclesIDList())
-
-
-def _route_of(start: Start) -> str:
-    """The id of SUMO's route for a tester: its way, by which SUMO's drivers anticipate it."""
-    if start.approach is None:
-        return "cavsumo_tester"
-    name = " ".join(("cavsumo", *start.approach.edges))
-    if name not in libsumo.route.getIDList():  # a shared simulation has it already
-        libsumo.route.add(name, list(start.approach.edges))
-    return name
+        self.teleports += len(teleports())
+        self.emergency_stops += len(stops())

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from support import PHONE
+from support import PHONE, json_lines
 
 from cavsumo.batch.replay import Record
 from cavsumo.model.geometry import Box
@@ -19,7 +19,7 @@ from cavsumo.network.site import Site
 from cavsumo.report.pages.replay.curves import moment
 from cavsumo.report.pages.replay.page import page as page_of
 from cavsumo.report.pages.replay.page import write_page
-from cavsumo.results.traces import Trace, parsed, states, trace_text
+from cavsumo.results.traces import Trace, parsed, states
 
 Shown = tuple[Record, Trace, Site]
 Opened = Callable[..., Any]
@@ -233,7 +233,7 @@ def test_names_are_only_text(opened: Opened, shown: Shown, tmp_path: Path) -> No
     """Names from maps, files and users that would be markup are shown as they are."""
     record, trace, site = shown
     nasty = "</script><img src=x onerror=alert(1)>{{ 7*7 }}'\"`"
-    text = trace_text(trace.head, trace.frames)
+    text = json_lines(trace.head, *trace.frames)
     for name in ("tester1", "bg_car0", "bg_person0"):
         text = text.replace(f'"{name}"', json.dumps(f"{name}{nasty}"))
     head = dict(parsed(text).head)

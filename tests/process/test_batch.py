@@ -19,7 +19,7 @@ from cavsumo.batch.worker import Worker
 from cavsumo.errors import InputError
 from cavsumo.model.seeds import episode_seed
 from cavsumo.results.rows import Outcome
-from cavsumo.results.traces import parsed
+from cavsumo.results.traces import trace_of
 
 SetUp = Callable[..., PreparedBatch]
 Row = dict[str, Any]
@@ -70,7 +70,8 @@ def played(prepared: PreparedBatch) -> list[Outcome]:
 
 def frames(outcome: Outcome) -> list[Any]:
     """The frames of an episode's trace."""
-    return list(parsed(outcome.trace).frames)
+    trace = trace_of(outcome)
+    return list(trace.frames) if trace else []
 
 
 def starts(outcome: Outcome) -> dict[str, Any]:

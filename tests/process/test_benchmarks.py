@@ -100,6 +100,7 @@ def test_branching(play: Play, capsys: pytest.CaptureFixture[str]) -> None:
     said = capsys.readouterr().out
     assert ended.value.code == 0, said
     assert said.count("5 of 5 branches the same (0 errors), 1 of 1 episodes") == 2
+    assert "refused  pedestrians" in said
     assert "by fork" in said
     before, after = said.split("resources")[1].splitlines()[0].split(": ")[1].split("; ")
     assert before.rpartition(",")[0] == after.rpartition(",")[0]
@@ -231,11 +232,51 @@ def test_replays(play: Play, capsys: pytest.CaptureFixture[str]) -> None:
     assert numbers(capsys.readouterr().out.splitlines()[-2]) == [1, 1, 0]
 
 
-def test_shared(play: Play) -> None:
-    """A block of two episodes."""
-    said = play("shared", "--blocks", "1", "--net", NET, SHARED_BY=2)
-    assert "2 episodes" in said.splitlines()[0]
-    assert "tests found" in said.splitlines()[-1]
+def test_episode_server(play: Play, capsys: pytest.CaptureFixture[str]) -> None:
+    """Three episodes of one setting."""
+    words = ["--net", NET, "--episodes", "1", "--relative", "1", "--many", "2"]
+    with pytest.raises(SystemExit) as ended:
+        play("episode_server", *words, SETTINGS={"defaults": {"end": 3.0}})
+    said = capsys.readouterr().out.splitlines()
+    assert not ended.value.code, said
+    assert "3 of 3 the same" in said[0]
+    assert "before and after 2 episodes" in said[1]
+    assert said[-1].endswith("(1.00)")
+
+
+def test_reading(play: Play) -> None:
+    """A small network, once."""
+    assert "1 site" in play("reading", "--net", NET, "--times", "1")
+
+
+def test_scale(play: Play, capsys: pytest.CaptureFixture[str]) -> None:
+    """Four episodes for eight rows, read by this checkout twice."""
+    with pytest.raises(SystemExit) as ended:
+        play("scale", "--rows", "8", "--played", "2", "--other", str(ROOT))
+    said = capsys.readouterr().out
+    assert ended.value.code == 0, said
+    assert said.count("the same bytes") == 3
+
+
+def test_soak(play: Play, capsys: pytest.CaptureFixture[str]) -> None:
+    """Three episodes, and no time for a kill."""
+    with pytest.raises(SystemExit) as ended:
+        play("soak", "--episodes", "3", "--quiet", "2", "--kills-every", "1000", "-j", "1")
+    said = capsys.readouterr().out
+    assert ended.value.code == 0, said
+    assert "0 errors, 0 after --retry-errors; 0 rows missing, in order: True" in said
+
+
+def test_speed(play: Play) -> None:
+    """Two episodes of this version beside itself, and the command."""
+    words = ["--net", NET, "--testers", "1", "--episodes", "2", "--rounds", "1"]
+    said = play("speed", *words, "--other", str(ROOT))
+    lines = said.splitlines()
+    assert len(lines) == 3
+    for line in lines[1:]:
+        bare, *others = numbers(line.partition(ROOT.name)[2])
+        assert bare > 0.0
+        assert len(others) == 6  # alone, whole, command, each with its ratio
 
 
 def test_ssm(play: Play) -> None:
@@ -250,6 +291,17 @@ def test_throughput(play: Play) -> None:
     assert len(shares) == 8
     assert sum(shares) == pytest.approx(100.0, abs=0.5)
     assert "contacts and assertions" in said
+
+
+def test_traces(play: Play) -> None:
+    """One episode of one network."""
+    said = play("traces", "--episodes", "1", "--rounds", "1", NETWORKS=("pedestrians",))
+    lines = said.splitlines()
+    assert lines[0].startswith("pedestrians: 1 traces, ")
+    shares = [numbers(line)[1] for line in lines if "level" in line]
+    assert len(shares) == 5
+    assert shares[0] < 50.0
+    assert shares == sorted(shares, reverse=True)
 
 
 # Experiments --------------------------------------------------------------------------------------

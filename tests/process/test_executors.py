@@ -17,14 +17,14 @@ from typing import Any
 
 import pytest
 from inline import played_here
-from support import PATIENCE_S, rows, until, untold
+from support import PATIENCE_S, rows, until
 
 from cavsumo.batch.dispatch import run_batch
 from cavsumo.batch.executors import Means, local_executor, opened
 from cavsumo.batch.prepared import PreparedBatch, prepare
 from cavsumo.cli import main
 from cavsumo.errors import BatchError
-from cavsumo.model.scenario import SHARED_BY, plan_from
+from cavsumo.model.scenario import plan_from
 from cavsumo.results.reading import read_manifest
 from cavsumo.results.rows import Outcome
 
@@ -78,25 +78,6 @@ def test_two_at_a_time_play_what_one_plays(prepared: PreparedBatch, quiet: list[
     with opened(Means(jobs=2)) as (executor, jobs):
         assert jobs == 2
         assert played(prepared, executor) == quiet
-
-
-def test_episodes_that_share_a_simulation_do_not_depend_on_who_plays_them(
-    networks: dict[str, Path], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """In this process or two others, at once or resumed in the middle of a block: the same rows."""
-    monkeypatch.chdir(tmp_path)
-    words = ["run", "-n", str(networks["crossing"]), "--reset", "shared", "--testers", "1"]
-    words += ["--runs", str(SHARED_BY + 3), "--end", "3", "-q", "--exit-zero"]
-    with played_here():
-        assert main([*words, "-o", "alone.csv"]) == 0
-    assert main([*words, "-o", "two.csv", "-j", "2"]) == 0
-    alone, file = untold(rows(Path("alone.csv"))), Path("two.csv")
-    assert untold(rows(file)) == alone
-    lines = file.read_bytes().splitlines(keepends=True)
-    file.write_bytes(b"".join(lines[:12]))
-    with played_here():
-        assert main(["run", "--resume", "-q", "--exit-zero", "-o", "two.csv"]) == 0
-    assert untold(rows(file)) == alone
 
 
 def test_a_plain_thread_pool_will_do(prepared: PreparedBatch, quiet: list[Any]) -> None:

@@ -18,6 +18,7 @@ import pytest
 from support import alive, until
 
 from cavsumo.errors import BranchError, SimulationError
+from cavsumo.model.fork_child import stand_alone
 from cavsumo.model.forks import can_fork, forked
 from cavsumo.model.offspring import descendants
 
@@ -101,6 +102,18 @@ def test_whoever_takes_too_long_is_killed(stopped: bool) -> None:
     error, other = outcomes(hang, lambda: 7, deadline=1.0)
     assert str(error) == "a branch gave no result within 1 s"
     assert other == 7
+
+
+def test_a_descriptor_closed_since_it_was_listed_is_left_alone() -> None:
+    """Its number may be given to the null device, which a child then is not to copy onto itself."""
+
+    def work() -> bool:
+        number = os.open(os.devnull, os.O_RDONLY)
+        os.close(number)  # the lowest number that is free
+        stand_alone({number: None}, 30.0)
+        return os.path.samestat(os.fstat(number), Path(os.devnull).stat())
+
+    assert outcomes(work) == [True]
 
 
 def test_a_child_takes_along_what_it_has_started(tmp_path: Path) -> None:

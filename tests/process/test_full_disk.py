@@ -51,14 +51,14 @@ from cavsumo.results.writing import Recorder
 
 file, what = Path(sys.argv[1]), sys.argv[2]
 row = {"agent": "noop", "outcome": "error", "error": 1500 * "x"}
-trace = 1500 * "y" if what == "rows" else 20_000 * "y"
+trace = 1500 * b"y" if what == "rows" else 20_000 * b"y"
 with Recorder(file) as recorder:
     recorder.begin({})
     resource.setrlimit(resource.RLIMIT_FSIZE, (10_000, 10_000))
     try:
         for run in range(20):
             last = what == "rows" or run == 3
-            recorder.write(Outcome(row | {"run": run}, trace if last else ""))
+            recorder.write(Outcome(row | {"run": run}, trace if last else b""))
     except BatchError as error:
         print(run, error)
 """
@@ -76,7 +76,7 @@ def test_a_full_disk_leaves_whole_rows(file: Path, what: str) -> None:
     assert 0 < len(rows) == int(failed) < 20
     assert file.read_bytes().endswith(b"\n")
     assert all(len(row["error"]) == 1500 for row in rows)
-    last = file.with_suffix("") / f"run{len(rows):06d}.jsonl"
+    last = file.with_suffix("") / f"run{len(rows):06d}.jsonl.gz"
     assert not last.exists() or what == "rows"
     todo = iter(range(20))
     with Recorder(file) as recorder:

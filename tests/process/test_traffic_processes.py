@@ -52,7 +52,7 @@ def test_the_same_seed_gives_the_same_bytes_in_any_process(networks: dict[str, P
 def test_rows_do_not_depend_on_the_processes(
     tmp_path: Path, networks: dict[str, Path], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """One process or two, shared or resumed: the same rows, and the manifest knows the traffic."""
+    """One process or two, or resumed: the same rows, and the manifest knows the traffic."""
     net = ["--net", str(networks["crossing"]), "--traffic", "6,3"]
     assert run(tmp_path, monkeypatch, *net, "--runs", "2", "-o", "a.csv") == 0
     assert run(tmp_path, monkeypatch, *net, "--runs", "2", "-j", "2", "-o", "b.csv") == 0

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import errno
 import os
 import pickle
 import shutil
@@ -340,6 +341,20 @@ def test_a_process_with_nothing_to_do_says_goodbye(
         ours.close()
         serving.join(PATIENCE_S)
     assert not serving.is_alive()
+
+
+def test_a_refusal_of_the_system_is_in_words(
+    prepared: PreparedBatch, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The file and the reason, without a number."""
+
+    def full(_: PreparedBatch) -> None:
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC), "types.add.xml")
+
+    monkeypatch.setattr(PreparedBatch, "check_here", full)
+    ours, theirs = Pipe()
+    worker_process._serve(theirs, Task(prepared))
+    assert ours.recv() == Reply("refused", "'types.add.xml': No space left on device")
 
 
 # Makes every new process idle for a short time only; Python runs it before anything else.

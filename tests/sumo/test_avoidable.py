@@ -32,6 +32,7 @@ from cavsumo.model.scenario import BatchPlan
 from cavsumo.model.snapshot import BodyState, Snapshot
 from cavsumo.network.site import Site
 from cavsumo.report.analysis import analyse
+from cavsumo.results.columns import COLUMNS
 from cavsumo.simulation.avoidability import (
     NOT_MONOTONE,
     Avoidability,
@@ -127,6 +128,8 @@ def test_whoever_steps_out_late_spares_only_the_fastest_driver(played: Played) -
         "human": False,
         "rss": True,
     }
+    both = retrial.judged(*(REFERENCES.make(name, {}) for name in ("human", "ideal")))
+    assert both == dataclasses.replace(seen["human"], by_ideal=True)
     human = seen["human"]
     assert human.last_chance is not None, "it would have had to know before the kerb"
     end = retrial.episode.frames[retrial.end].time
@@ -378,6 +381,7 @@ def test_an_ideal_driver_prevents_what_an_ego_without_brakes_does(batch: Path) -
     failures = [row for row in rows(batch) if row["outcome"] == "violated"]
     assert len(failures) >= 3
     assert {row["avoidable"] for row in failures} == {"1"}
+    assert {row["avoidable_ideal"] for row in failures} == {"1"}
     for row in failures:
         margin = float(row["violation_time_s"]) - float(row["last_chance_s"])
         assert row["reference"] == "ideal"
@@ -386,6 +390,17 @@ def test_an_ideal_driver_prevents_what_an_ego_without_brakes_does(batch: Path) -
     for row in rows(batch):
         if row["outcome"] != "violated":
             assert {row["avoidable"], row["last_chance_s"], row["reference"]} == {""}
+
+
+def test_the_ideal_driver_is_asked_besides_another(staged: Staged, batch: Path) -> None:
+    """A batch judged by a human says the same of the ideal driver as one judged by that."""
+    plan, site = staged("pedestrians", **BATCH | {"reference": "human"})
+    with EpisodeRunner(prepared_at(plan, site)) as runner:
+        found = [runner.play(job(plan, run)).outcome.row for run in range(plan.runs)]
+    told = ["" if r["avoidable_ideal"] is None else str(r["avoidable_ideal"]) for r in found]
+    assert told == [row["avoidable"] for row in rows(batch)]
+    assert "1" in told
+    assert {r["avoidable"] for r in found} >= {0}
 
 
 def test_the_verdicts_do_not_depend_on_who_plays(
@@ -426,7 +441,8 @@ def test_no_reference_leaves_the_rest_of_the_row_as_it_is(
     plan = plan.model_copy(update={"reference": "ideal"})
     with EpisodeRunner(prepared_at(plan, site)) as runner:
         with_it = runner.play(job(plan, number), lambda: beats.append(1)).outcome
-    for name in ("avoidable", "reference", "last_chance_s", "margin_s", "avoidable_note", "wall_s"):
+    verdicts = {name for name in COLUMNS if name.startswith("avoidable")}
+    for name in verdicts | {"reference", "last_chance_s", "margin_s", "wall_s"}:
         with_it.row.pop(name, None)
         without.row.pop(name, None)
     assert with_it.row == without.row

@@ -23,7 +23,8 @@ from cavsumo.model.geometry import gap
 from cavsumo.model.scenario import BatchPlan
 from cavsumo.model.snapshot import BodyState, RawState, Snapshot
 from cavsumo.network.site import Site
-from cavsumo.simulation.loop import Episode, play
+from cavsumo.simulation.episode import Episode
+from cavsumo.simulation.loop import play
 from cavsumo.sumo.background import Background, Roaming, roaming
 
 Staged = Callable[..., tuple[BatchPlan, Site]]
@@ -185,16 +186,17 @@ def test_whoever_is_left_out_of_a_snapshot_touches_nobody(staged: Staged, name: 
         world, one = runner.setup.world, job(plan, 0)
         inner = world._snapshot
 
-        def checked(ego: BodyState, states: tuple[BodyState, ...]) -> Snapshot:
+        def checked() -> Snapshot:
             nonlocal skipped
-            snapshot = inner(ego, states)
-            all_of_them = Background(libsumo.vehicle, libsumo.person, None, DT, (ego, *states))
+            snapshot = inner()
+            ones = (snapshot.ego, *snapshot.testers)
+            all_of_them = Background(libsumo.vehicle, libsumo.person, None, DT, ones)
             shown = {raw[0].id: raw for raw in snapshot.raw_background}
             here = (libsumo.vehicle.getIDList(), libsumo.person.getIDList())
-            for raw in all_of_them.read(*here, (ego, *states)):
+            for raw in all_of_them.read(*here, ones):
                 skipped += raw[0].id not in shown
                 assert shown.get(raw[0].id, raw) == raw
-                assert raw[0].id in shown or _apart(raw, (ego, *states))
+                assert raw[0].id in shown or _apart(raw, ones)
             return snapshot
 
         world._snapshot = checked  # type: ignore[method-assign]

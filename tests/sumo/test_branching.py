@@ -7,7 +7,7 @@ import os
 import random
 import re
 import signal
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -23,9 +23,10 @@ from cavsumo.errors import BranchError
 from cavsumo.model.bodies import NOOP, Action
 from cavsumo.model.snapshot import Snapshot
 from cavsumo.simulation.branching import Continuation, branch, branches
-from cavsumo.simulation.loop import Episode, EpisodeLoop
+from cavsumo.simulation.episode import Episode
+from cavsumo.simulation.loop import EpisodeLoop
 from cavsumo.simulation.playback import played_back, recorded
-from cavsumo.sumo import reseeding
+from cavsumo.sumo import native
 
 Begin = Callable[..., EpisodeLoop]
 STEPS = 25  # of the episode before it is branched
@@ -282,21 +283,8 @@ def test_an_ego_that_steers_itself_is_not_handed_to_one_that_does_not(begin: Beg
 
 def test_another_libsumo_refuses_a_seed(begin: Begin, monkeypatch: pytest.MonkeyPatch) -> None:
     """Where its functions have other names; without a seed it branches."""
-    monkeypatch.setattr(reseeding, "SEED_ALL", "other")
+    monkeypatch.setattr(native, "SEED_ALL", "other")
     loop = begin("pedestrians")
     with pytest.raises(BranchError, match="branch without a seed"):
         branch(loop, Continuation(seed=1))
     assert branch(loop, Continuation(steps=2)).steps == STEPS + 2
-
-
-def test_a_shared_simulation_is_branched_only_by_a_fork(
-    set_up: Callable[..., PreparedBatch],
-) -> None:
-    """Of its past only a fork knows."""
-    with EpisodeRunner(set_up("pedestrians", reset="shared")) as runner:
-        own = job(runner.plan, 0)
-        agents: Sequence[Agent] = runner.agents_of(own)
-        loop = EpisodeLoop(runner.setup, agents, own.seed, simulation="new")
-        assert branch(loop, Continuation(steps=2)).steps == 2
-        with pytest.raises(BranchError, match="by a fork alone"):
-            branch(loop, Continuation(steps=2), fork=False)

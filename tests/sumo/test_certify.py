@@ -33,7 +33,7 @@ from cavsumo.results.reading import HEADER
 from cavsumo.results.recorded_plan import recorded_plan
 from cavsumo.results.rows import row_line
 from cavsumo.results.statistics import lower_bound
-from cavsumo.results.traces import Trace, parsed
+from cavsumo.results.traces import Trace, trace_of
 
 LEARNT = 5  # the third episode of the learner in the results
 # An ego that fails in every episode whose seed is odd.
@@ -91,7 +91,9 @@ def traced(plan: BatchPlan, run: int, seed: int | None = None) -> Trace:
     if seed is not None:
         again = dataclasses.replace(again, seed=seed)
     with EpisodeRunner(prepare(plan)) as runner:
-        return parsed(runner.play(again).outcome.trace)
+        found = trace_of(runner.play(again).outcome)
+    assert found is not None
+    return found
 
 
 # What is played
@@ -299,10 +301,48 @@ def test_all_sorts_of_egos_and_what_goes_wrong_counts_against_the_test(
         level = 1 - 0.05 / 3
         assert one["runs"] == 3
         assert one["triggered_at_least"] == lower_bound(one["tests"], 3, level)
+        assert one["preventable_at_least"] == lower_bound(one["preventable"], 3, level)
         assert one["violated_at_least"] == lower_bound(one["failures"], 3, level)
+        assert one["preventable"] <= one["failures"]
     assert played["constant"]["tests"] > played[f"{moody}:Moody"]["tests"]
     assert said["triggered_at_least"] == min(one["triggered_at_least"] for one in said["egos"])
     assert said["seeds_excluded"] == 3
+
+
+@pytest.mark.parametrize("reference", ["human", "none"])
+def test_preventable_failures_come_first_or_nobody_judged(
+    networks: dict[str, Path],
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+    reference: str,
+) -> None:
+    """The reference driver of the results judges; with none, the certificate says so."""
+    file = tmp_path / "found.csv"
+    words = f"run -n {networks['pedestrians']} -r none -o {file} -q --exit-zero -e 15 --runs 1"
+    assert main([*words.split(), "--ego", "constant", "--reference", reference]) == Exit.OK
+    certify = ["certify", str(file), "timing", "--runs", "3", "-q", "--exit-zero"]
+    output = ["-o", str(tmp_path / "c.csv")]
+    assert main([*certify, *output]) == Exit.OK
+    said = capsys.readouterr().out
+    judged = [row["avoidable"] for row in rows(tmp_path / "c-constant.csv") if row["avoidable"]]
+    assert ("preventable" in said.splitlines()[0]) == (reference == "human") == bool(judged)
+    assert ("No reference driver judged the failures" in said) == (reference == "none")
+    assert main([*certify, "--json"]) == Exit.OK
+    told = json.loads(capsys.readouterr().out)
+    assert told["reference"] == reference
+    preventable = told["egos"][0]["preventable"]
+    assert preventable == (judged.count("1") if reference == "human" else None)
+
+
+def test_starts_are_those_that_were_drawn(found: Path) -> None:
+    """Where a tester waited before it was moved away from somebody."""
+    record = recorded(found, 0)
+    assert record.trace is not None
+    head = record.trace.head
+    waited = [[x + 1.0, *rest] for x, *rest in head["starts"]]
+    moved = dataclasses.replace(record.trace, head={**head, "waited": waited})
+    kept = of_run(dataclasses.replace(record, trace=moved), {}, kept=True, open_loop=False)
+    assert kept.starts == [tuple(start[:3]) for start in waited]
 
 
 def test_starts_are_kept_or_refused(

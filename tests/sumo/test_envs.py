@@ -193,10 +193,9 @@ def test_a_world_beside_an_environment_takes_the_simulation_too(
         world.reset(1, (), ())
         with pytest.raises(SimulationTaken):
             env.step(np.zeros(6, dtype=np.float32))
-        world.reset(1, (), (), simulation="new")
         env.reset(seed=1)
         with pytest.raises(SimulationTaken, match="begin a new"):
-            world.reset(1, (), (), simulation="same")
+            world.step((), None)
         world.reset(1, (), ())
     with pytest.raises(SimulationTaken):
         env.step(np.zeros(6, dtype=np.float32))

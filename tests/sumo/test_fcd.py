@@ -8,13 +8,14 @@ from typing import Any
 
 import pytest
 import sumolib
+from support import frame, json_lines
 
 from cavsumo.agents.recorded import Recorded
 from cavsumo.batch.replay import Record
 from cavsumo.errors import InputError
 from cavsumo.interop.fcd import write_fcd
 from cavsumo.network.site import Site
-from cavsumo.results.traces import Trace, frame, parsed, trace_head, trace_text
+from cavsumo.results.traces import Trace, parsed, trace_head
 from cavsumo.sumo import connection
 from cavsumo.sumo.options import OPTIONS
 from cavsumo.sumo.world import World
@@ -80,7 +81,7 @@ def test_testers_are_among_them(shown: tuple[Record, Trace, Site], tmp_path: Pat
 def test_times_and_names_are_sumos(shown: tuple[Record, Trace, Site], tmp_path: Path) -> None:
     """Timesteps carry their times, and any name survives the way through XML."""
     trace, file, odd = shown[1], tmp_path / "fcd.xml", 'a "b" <c> & d'
-    text = trace_text(trace.head, trace.frames[:3])
+    text = json_lines(trace.head, *trace.frames[:3])
     changed = parsed(text.replace("bg_car0", odd.replace('"', '\\"')))
     write_fcd(changed, file)
     assert [t.time for t in sumolib.xml.parse(str(file), "timestep")] == ["0.000", "0.100", "0.200"]

@@ -10,6 +10,7 @@ from typing import Any
 import pytest
 from support import Troupe, content, rows, traces
 
+from cavsumo.batch import merge
 from cavsumo.batch.batch_run import BatchRun
 from cavsumo.batch.executors import local_executor
 from cavsumo.batch.prepared import manifest, prepare
@@ -55,9 +56,12 @@ def town(networks: Mapping[str, Path], tmp_path_factory: pytest.TempPathFactory)
     return folder
 
 
-@pytest.fixture
-def home(town: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """A copy of all that in the working folder."""
+@pytest.fixture(params=[0, 1 << 60], ids=["by columns", "row by row"])
+def home(
+    request: pytest.FixtureRequest, town: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> Path:
+    """A copy of all that in the working folder, merged as large results are or as small ones."""
+    monkeypatch.setattr(merge, "LARGE", request.param)
     shutil.copytree(town, tmp_path / "home")
     monkeypatch.chdir(tmp_path / "home")
     return tmp_path / "home"
@@ -120,7 +124,7 @@ def damage(file: Path, change: Callable[[list[bytes]], list[bytes]]) -> None:
 
 def untraced(home: Path) -> None:
     """Remove one trace of part b."""
-    min((home / "b").glob("*.jsonl")).unlink()
+    min((home / "b").glob("*.jsonl.gz")).unlink()
 
 
 def foreign(home: Path) -> None:

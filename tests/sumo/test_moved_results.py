@@ -6,23 +6,30 @@ The network and the routes are deleted where they were, and the working folder i
 from __future__ import annotations
 
 import csv
+import errno
 import json
+import os
 import re
 import shutil
 from collections.abc import Iterator
+from functools import partial
 from pathlib import Path
+from typing import Any
 
 import pytest
 from support import content, rows, traces
 
 import cavsumo
 from cavsumo.batch.certify.used_seeds import used
+from cavsumo.batch.prepared import PreparedBatch
 from cavsumo.cli import main
 from cavsumo.results.reading import FIRST, read_manifest
+from cavsumo.results.trace_file import read_trace_text
 
 RUN = 1  # which the ego fails
 PLAYED = ("run", "--net", "networks/crossing.net.xml", "--runs", "2", "--trace", "all")
 QUIET = ("-q", "--exit-zero")
+PARTS = ("part1", "part2")
 # The header of version 0.1.
 OLD = (
     "run,agent,ego,testers,reset,embodiment,sumo_width_m,seed,forecast,forecast_value,outcome,"
@@ -68,6 +75,49 @@ def elsewhere(tmp_path: Path, moved: Path, monkeypatch: pytest.MonkeyPatch) -> I
     assert content(moved) == before
 
 
+@pytest.fixture
+def closed(moved: Path, elsewhere: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """The results, of files that lay in a folder which is closed to this user."""
+    folder = elsewhere / "theirs"
+    for file in (_copied(moved, elsewhere), *map(partial(_copied, moved, elsewhere), PARTS)):
+        for text in (file.with_suffix(".json"), *file.with_suffix("").glob("run*.jsonl")):
+            found = text.read_text("utf-8")
+            for sort in ("networks", "routes"):
+                found = found.replace(f'"{sort}/crossing.', f'"{folder}/{sort}/crossing.')
+            text.write_text(found, "utf-8")
+    stat = os.stat
+
+    def refused(path: Any, *args: Any, **how: Any) -> os.stat_result:
+        if not isinstance(path, int) and Path(os.fsdecode(path)).is_relative_to(folder):
+            raise PermissionError(errno.EACCES, os.strerror(errno.EACCES), path)
+        return stat(path, *args, **how)
+
+    monkeypatch.setattr(os, "stat", refused)
+    return elsewhere / "results.csv"
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        "replay results.csv 1",
+        "replay results/run000001.jsonl --playback",
+        "replay results.csv 1 --recorded --html page.html",
+        "report results.csv --html report.html -o t.txt",
+        "certify results.csv 1 --runs 1 -q --exit-zero",
+        "merge part1.csv part2.csv -o whole.csv -q",
+        "run --resume -o results.csv --runs 3 -q --exit-zero",
+    ],
+)
+def test_the_old_folder_may_be_closed_to_this_user(
+    closed: Path, capsys: pytest.CaptureFixture[str], words: str
+) -> None:
+    """Somebody else's home: the inputs carried are used, and nothing is said."""
+    assert main(words.split()) == 0
+    said = capsys.readouterr().err
+    assert "denied" not in said
+    assert "without" not in said
+
+
 @pytest.mark.parametrize("words", [(), ("--playback",), ("--recorded",)])
 def test_a_row_is_played_again(
     moved: Path, elsewhere: Path, capsys: pytest.CaptureFixture[str], words: tuple[str, ...]
@@ -86,8 +136,30 @@ def test_a_trace_is_played_with_the_inputs_beside_it(
 ) -> None:
     """The folder of traces alone, sent to somebody."""
     shutil.copytree(moved / "results", elsewhere / "sent")
-    assert main(["replay", "sent/run000001.jsonl"]) == 0
+    assert main(["replay", "sent/run000001.jsonl.gz"]) == 0
     assert capsys.readouterr().out.endswith(" frames: the same\n")
+
+
+def test_traces_that_are_not_compressed_are_read_everywhere(
+    moved: Path, elsewhere: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """As 0.1 left them: replayed, shown, reported, certified, loaded and merged."""
+    for stem in ("results", "part1", "part2"):
+        file = _copied(moved, elsewhere, stem)
+        for trace in file.with_suffix("").glob("*.jsonl.gz"):
+            trace.with_suffix("").write_text(read_trace_text(trace), encoding="utf-8")
+            trace.unlink()
+        file.write_text(file.read_text("utf-8").replace(".jsonl.gz", ".jsonl"), "utf-8")
+    one = "results/run000001.jsonl"
+    assert main(["replay", one]) == main(["replay", one, "--playback"]) == 0
+    assert main(["replay", "results.csv", "1", "--recorded", "--fcd", "f.xml"]) == 0
+    assert main(["report", "results.csv", "--html", "report.html", "-o", "t.txt"]) == 0
+    assert "No replay pages" not in capsys.readouterr().err
+    words = ["certify", "results.csv", str(RUN), "--runs", "1", "--open-loop", "-o", "c.csv"]
+    assert main([*words, *QUIET]) == 0
+    assert cavsumo.load("results.csv").replay(RUN, recorded=True).row["outcome"] == "violated"
+    assert main(["merge", "part1.csv", "part2.csv", "-o", "whole.csv", "-q"]) == 0
+    assert content(Path("whole")) == content(moved / "results")  # compressed again
 
 
 def test_python_plays_them_too(moved: Path, elsewhere: Path) -> None:
@@ -95,6 +167,18 @@ def test_python_plays_them_too(moved: Path, elsewhere: Path) -> None:
     results = cavsumo.load(moved / "results.csv")
     assert results.replay(RUN).row["outcome"] == "violated"
     assert len(results.replay(RUN, recorded=True).frames) > 0
+
+
+def test_python_plays_the_scenario_again(moved: Path, elsewhere: Path) -> None:
+    """On the network that the results carry; without it, the file is named."""
+    results = cavsumo.load(moved / "results.csv")
+    again = cavsumo.run(results.scenario, runs=2, trace="all", progress=False)
+    assert rows(again.file) == rows(results.file)
+    assert again.manifest["plan"]["scenario"] == results.manifest["plan"]["scenario"]
+    bare = _copied(moved, elsewhere)
+    shutil.rmtree(elsewhere / "results" / "inputs")
+    with pytest.raises(cavsumo.InputError, match="no such file"):
+        cavsumo.run(cavsumo.load(bare).scenario, runs=1)
 
 
 def test_a_report_has_its_pages(
@@ -124,7 +208,7 @@ def test_a_report_says_which_pages_it_cannot_make(
     (elsewhere / "results").mkdir()
     shutil.copytree(moved / "results" / "inputs", elsewhere / "results" / "inputs")
     text = file.read_text("utf-8")
-    file.write_text(re.sub(r"results/run\d+\.jsonl", "", text), "utf-8")
+    file.write_text(re.sub(r"results/run\d+\.jsonl\.gz", "", text), "utf-8")
     assert main(["report", str(file), "--html", "report.html", "-o", "t.txt"]) == 0
     assert "pages of 1 of the listed runs: no trace of them was kept" in capsys.readouterr().err
 
@@ -172,6 +256,32 @@ def test_a_batch_is_continued(moved: Path, elsewhere: Path, tmp_path: Path) -> N
     assert _inputs(file) == _inputs(moved / "results.csv")
 
 
+def test_a_process_elsewhere_says_that_it_does_not_see_the_copies(
+    moved: Path,
+    elsewhere: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    """A dask worker on another machine: one sentence with the name and the remedy."""
+    file = _copied(moved, elsewhere)
+    here = PreparedBatch.check_here
+
+    def on_another_machine(prepared: PreparedBatch) -> None:
+        for place in prepared.plan.scenario.places.values():
+            place.rename(place.with_suffix(".away"))
+        try:
+            here(prepared)
+        finally:
+            for place in prepared.plan.scenario.places.values():
+                place.with_suffix(".away").rename(place)
+
+    monkeypatch.setattr(PreparedBatch, "check_here", on_another_machine)
+    assert main(["run", "--resume", "-o", str(file), "--runs", "3", *QUIET]) == 2
+    said = capsys.readouterr().err
+    assert said.startswith("cavsumo: 'networks/crossing.net.xml' is not at ")
+    assert said.endswith("put the file where it was, where all processes see it\n")
+
+
 def test_an_edited_network_is_not_continued_on(
     moved: Path, elsewhere: Path, networks: dict[str, Path], capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -186,9 +296,12 @@ def test_an_edited_network_is_not_continued_on(
 
 
 def test_weights_are_carried(
-    networks: dict[str, Path], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    networks: dict[str, Path],
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
 ) -> None:
-    """What an agent learned elsewhere: replayed, and its seeds are still excluded."""
+    """What an agent learned elsewhere: replayed, shown and its seeds are still excluded."""
     words = ["run", "--net", str(networks["pedestrians"]), "--routes", "none", "--end", "5"]
     words += ["--agent", "q-learning", "--runs", "2", *QUIET]
     school, late = tmp_path / "school", tmp_path / "late"
@@ -197,15 +310,51 @@ def test_weights_are_carried(
     monkeypatch.chdir(school)
     assert main([*words, "-o", "school.csv"]) == 0
     param = ["--param", "weights=school.json", "--seed", "5", "-o", "../late/results.csv"]
+    param += ["--trace", "all"]
     assert main([*words, *param]) == 0
     monkeypatch.chdir(late)
     shutil.rmtree(school)
-    assert main(["replay", "results.csv", "1"]) == 0
+    capsys.readouterr()
+    for how in ([], ["--playback"], ["--recorded", "--html", "page.html"]):
+        assert main(["replay", "results.csv", "1", *how]) == 0
+    assert main(["report", "results.csv", "--html", "report.html", "-o", "t.txt"]) == 0
+    said = capsys.readouterr().err.splitlines()
+    assert [line for line in said if not line.startswith("cavsumo: wrote ")] == []
     certify = ["certify", "results.csv", "q-learning", "--runs", "1", "-q", "--exit-zero"]
     assert main(certify) == 0
     found = used([Path("results.csv")], {})
     assert len(found.seeds) == 4
     assert [str(file) for file in found.results] == ["results.csv", "school.csv"]
+
+
+def test_files_that_only_sumo_knows_of_are_named(
+    networks: dict[str, Path],
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    """They are not kept: the batch says so, a replay elsewhere has them put beside the results."""
+    home, away = tmp_path / "home", tmp_path / "away"
+    home.mkdir()
+    monkeypatch.chdir(home)
+    (home / "more.add.xml").write_text(
+        '<additional><include href="types.add.xml"/>'
+        '<e1Detector id="d" lane="westbound_1" pos="5" file="out.xml"/></additional>'
+    )
+    (home / "types.add.xml").write_text('<additional><vType id="x" vClass="bus"/></additional>')
+    words = ["run", "-n", str(networks["pedestrians"]), "-r", "none", "-a", "more.add.xml"]
+    assert main([*words, "--end", "5", "--runs", "1", "-o", "results.csv", *QUIET]) == 0
+    assert capsys.readouterr().err == (
+        "cavsumo: 'more.add.xml' has SUMO read 'types.add.xml', which the results do not keep: a "
+        "replay elsewhere needs both beside them\n"
+    )
+    home.rename(away)
+    monkeypatch.chdir(tmp_path)
+    (away / "more.add.xml").rename(tmp_path / "more.add.xml")
+    assert main(["replay", "away/results.csv", "0"]) == 2
+    assert "types.add.xml" in capsys.readouterr().err
+    (tmp_path / "more.add.xml").rename(away / "more.add.xml")
+    assert main(["replay", "away/results.csv", "0"]) == 0
 
 
 # Of version 0.1

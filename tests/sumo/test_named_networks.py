@@ -17,6 +17,7 @@ from cavsumo.errors import InputError, UnknownName
 from cavsumo.model import named_networks
 from cavsumo.model.scenario import plan_from
 from cavsumo.model.scenario_file import read_config
+from cavsumo.results.trace_file import read_trace_text, unpacked
 
 FEW = ("--runs", "3", "--trace", "all", "--end", "12", "-q", "--exit-zero")
 
@@ -34,7 +35,7 @@ def without_place(folder: Path, *places: str) -> dict[str, str]:
     for name, data in content(folder).items():
         if name == "results.json" or "/inputs/" in name:
             continue
-        text = data.decode()
+        text = unpacked(data)
         for place in sorted(places, key=len, reverse=True):
             text = text.replace(json.dumps(place), '"PLACE"')
         if name.endswith(".csv"):  # without the real time
@@ -57,21 +58,43 @@ def test_a_name_plays_what_its_path_plays(
     assert found[0] == found[1]
 
 
+def test_routes_have_the_names_of_their_networks(
+    away: Path, networks: dict[str, Path], routes: dict[str, Path]
+) -> None:
+    """On the command line, in scenario files, in Python and for a replay; a file goes before."""
+    net = str(networks["crossing"])
+    named = plan_from({"net": net, "routes": "crossing"}, "here").scenario
+    assert named.routes == plan_from({"net": "crossing"}, "here").scenario.routes
+    assert named.routes_file == routes["crossing"]
+    (away / "sub").mkdir()
+    (away / "sub" / "c.toml").write_text(f'net = "{net}"\nroutes = "crossing"\n')
+    assert plan_from(read_config(Path("sub/c.toml")), "here").scenario == named
+    assert main(["run", "-n", net, "-r", "crossing", *FEW, "-o", "results.csv"]) == 0
+    shutil.rmtree(away / "results" / "inputs")
+    again = ["replay", "results.csv", "0", "--net", "crossing", "--routes"]
+    assert main([*again, "crossing"]) == 0
+    assert main([*again, "junction"]) == 2
+    with pytest.raises(UnknownName, match="unknown routes 'crosing'; did you mean 'crossing'"):
+        plan_from({"net": net, "routes": "crosing"}, "here")
+    Path("crossing").write_text("<routes/>")
+    assert plan_from({"net": net, "routes": "crossing"}, "here").scenario.routes == Path("crossing")
+
+
 def test_a_recorded_name_is_found_again_anywhere(
     away: Path, monkeypatch: pytest.MonkeyPatch, tmp_path_factory: pytest.TempPathFactory
 ) -> None:
     """Results and a lone trace hold no place of this machine, and are replayed by the name."""
     assert main(["run", "--net", "junction", *FEW, "-o", "results.csv"]) == 0
-    trace = next((away / "results").glob("*.jsonl"))
-    texts = [trace.read_text(), (away / "results.json").read_text()]
+    trace = next((away / "results").glob("*.jsonl.gz"))
+    texts = [read_trace_text(trace), (away / "results.json").read_text()]
     assert not [text for text in texts if str(ROOT) in text]
     other = tmp_path_factory.mktemp("elsewhere")
     shutil.copytree(away, other, dirs_exist_ok=True)
     monkeypatch.chdir(other)
     assert main(["replay", "results.csv", "0"]) == 0
-    shutil.copy(trace, other / "sent.jsonl")
-    assert main(["replay", "sent.jsonl"]) == 0
-    assert main(["replay", "sent.jsonl", "--net", "junction"]) == 0
+    shutil.copy(trace, other / "sent.jsonl.gz")
+    assert main(["replay", "sent.jsonl.gz"]) == 0
+    assert main(["replay", "sent.jsonl.gz", "--net", "junction"]) == 0
     assert main(["run", "--net", "junction", *FEW, "-o", "results.csv", "--resume"]) == 0
     assert main(["run", "--resume", "-q", "--exit-zero"]) == 0  # of what was recorded, no default
 
@@ -82,7 +105,7 @@ def test_another_network_of_the_same_name_is_refused_in_a_replay(
     """By its checksum; the one recorded may be kept with the trace, or lie beside it."""
     words = [*FEW, "--runs", "1"]
     assert main(["run", "--net", "pedestrians", *words, "-o", "results.csv"]) == 0
-    trace = next((away / "results").glob("*.jsonl"))
+    trace = next((away / "results").glob("*.jsonl.gz"))
     changed = away / "package"
     for folder in ("networks", "routes"):
         shutil.copytree(ROOT / folder, changed / folder)
@@ -125,7 +148,7 @@ def test_an_unknown_name_is_one_sentence(
     (away / "scenario.toml").write_text('net = "crosing"\n')
     if "{trace}" in words:
         assert main(["run", "--net", "pedestrians", *FEW, "--runs", "1", "-o", "a.csv"]) == 0
-        words = words.format(trace=next((away / "a").glob("*.jsonl")))
+        words = words.format(trace=next((away / "a").glob("*.jsonl.gz")))
     before = content(away)
     assert main(words.split()) == 2
     said = capsys.readouterr().err

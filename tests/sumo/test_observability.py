@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from support import prepared_at, rows, traces
+from support import frame, prepared_at, rows, traces
 
 from cavsumo.agents import AGENTS, Agent
 from cavsumo.agents.casting import resolve_cast
@@ -21,7 +21,6 @@ from cavsumo.model.seeds import episode_seed
 from cavsumo.model.sensors import Sensor
 from cavsumo.model.snapshot import Snapshot
 from cavsumo.network.site import Site
-from cavsumo.results.traces import frame
 from cavsumo.simulation.loop import EpisodeLoop, play
 from cavsumo.simulation.setup import make_setup
 

@@ -21,8 +21,9 @@ from cavsumo.model.carriageway import StartRecord
 from cavsumo.model.departures import Demand
 from cavsumo.model.snapshot import Snapshot
 from cavsumo.network.recorded_starts import recorded_start
-from cavsumo.results.traces import Trace, parsed
-from cavsumo.simulation.loop import Episode, play
+from cavsumo.results.traces import Trace, trace_of
+from cavsumo.simulation.episode import Episode
+from cavsumo.simulation.loop import play
 from cavsumo.simulation.playback import played_back, recorded
 from cavsumo.sumo.recorded_demand import route_file, types_told
 
@@ -150,9 +151,9 @@ def test_starts_of_another_site_are_refused(set_up: SetUp, played: Callable[...,
 @pytest.fixture(scope="module")
 def trace_file(set_up: SetUp, tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The trace of an episode with traffic."""
-    file = tmp_path_factory.mktemp("trace") / "run000001.jsonl"
+    file = tmp_path_factory.mktemp("trace") / "run000001.jsonl.gz"
     with EpisodeRunner(set_up("crossing", routes="auto", trace="all")) as runner:
-        file.write_text(runner.play(job(runner.plan, 1)).outcome.trace, encoding="utf-8")
+        file.write_bytes(runner.play(job(runner.plan, 1)).outcome.trace)
     return file
 
 
@@ -164,7 +165,8 @@ def test_a_trace_is_played_back_without_agent_and_demand(trace_file: Path) -> No
     assert record.plan.agents == ("playback=recorded",)
     assert not any(name.endswith(".rou.xml") for name in record.origin["sha256"])
     with EpisodeRunner(prepare(record.plan)) as runner:
-        again = parsed(runner.play(playback_job(record)).outcome.trace)
+        again = trace_of(runner.play(playback_job(record)).outcome)
+    assert again
     assert record.trace
     assert again.frames == record.trace.frames
     for part in ("starts", "waited", "departures", "approaches", "bodies"):

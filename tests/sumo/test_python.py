@@ -138,6 +138,30 @@ def test_an_interrupt_keeps_what_ran(tmp_path: Path, monkeypatch: pytest.MonkeyP
     assert len(cavsumo.run("pedestrians", resume=True, **short)) == 9
 
 
+def test_a_study_gives_the_results_of_each_batch(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """By name, with and without an output; ``run`` says what plays it."""
+    config = tmp_path / "study.toml"
+    config.write_text('net = "pedestrians"\nend = 2.0\nruns = 1\n[vary]\ntesters = [1, 2]\n')
+    played = cavsumo.run_study(config, ego="constant", output=tmp_path / "all.csv")
+    assert list(played) == ["testers1", "testers2"]
+    for count, (name, results) in enumerate(played.items(), 1):
+        assert results.file == tmp_path / f"all-{name}.csv"
+        assert results.scenario.testers == count
+        assert list(results.rows["ego"]) == ["constant"]
+    again = cavsumo.run_study(config, ego="constant")
+    assert again["testers2"].rows["seed"].equals(played["testers2"].rows["seed"])
+    file = again.pop("testers1").file
+    assert again["testers2"].replay(0).run == 0  # its folder is there as long as one of them is
+    assert file.is_file()
+    with pytest.raises(cavsumo.InputError, match="run_study plays them"):
+        cavsumo.run(config=config)
+    with pytest.raises(cavsumo.InputError, match="testers, which is given beside the file"):
+        cavsumo.run_study(config, testers=3)
+    assert capsys.readouterr() == ("", "")
+
+
 # Wrong arguments
 
 

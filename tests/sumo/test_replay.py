@@ -31,6 +31,7 @@ from cavsumo.cli.commands.replay import ReplayOptions, replay
 from cavsumo.cli.commands.run import run
 from cavsumo.errors import DivergenceError, Exit, InputError, ResultsError
 from cavsumo.results.columns import COLUMNS
+from cavsumo.results.trace_file import read_trace_text
 
 Frames = list[dict[str, Any]]
 RUN = 1  # the episode that is played again
@@ -199,7 +200,7 @@ def test_the_command_names_a_change_on_disk(
     """One digit changed in the file: exit status 1 and the timestep, body and quantity."""
     file = _copied(recording.csv_file, tmp_path)
     trace = tmp_path / recording.row["trace"]
-    lines = trace.read_text(encoding="utf-8").splitlines()
+    lines = read_trace_text(trace).splitlines()
     frame = json.loads(lines[1 + 6])
     frame["testers"]["tester1"][0] += 1e-9
     lines[1 + 6] = json.dumps(frame)
@@ -235,7 +236,7 @@ def test_a_learners_episode_can_be_replayed(networks: dict[str, Path], tmp_path:
     settings = {"net": networks["pedestrians"], "agents": ["noop", "q-learning"], "runs": 3}
     run(settings | {"trace": "all", "end": 5.0}, file, Means(), Manner(quiet=True, exit_zero=True))
     assert replay(file, ReplayOptions(5)) == Exit.OK
-    alone = file.with_suffix("") / "run000005.jsonl"
+    alone = file.with_suffix("") / "run000005.jsonl.gz"
     assert replay(alone, ReplayOptions()) == Exit.OK  # what it knew before is in its trace
 
 
@@ -277,7 +278,7 @@ def test_a_trace_of_something_else_is_refused(
     """Lines that hold no frame, or no text: refused as damaged, not with a traceback."""
     file = _copied(recording.csv_file, tmp_path)
     trace = tmp_path / recording.row["trace"]
-    trace.write_bytes(trace.read_bytes() + line + b"\n")
+    trace.write_bytes(read_trace_text(trace).encode("utf-8") + line + b"\n")
     with pytest.raises(ResultsError, match="trace"):
         recorded(file, RUN)
 
@@ -308,7 +309,7 @@ def test_what_was_recorded_is_shown_without_playing(
 ) -> None:
     """The page of a record that could not come out the same any more; it says so."""
     file, page = _sent(recording, tmp_path), tmp_path / "page.html"
-    text = file.read_text(encoding="utf-8").replace('"libsumo": "', '"libsumo": "0.')
+    text = read_trace_text(file).replace('"libsumo": "', '"libsumo": "0.')
     file.write_text(text.replace('"lights": ""', '"lights": "r"'), encoding="utf-8")
     assert main(["replay", str(file), "--recorded", "--html", str(page)]) == Exit.OK
     assert "as recorded" in capsys.readouterr().out
@@ -335,7 +336,7 @@ def test_one_changed_number_of_a_lone_trace_is_named(
 ) -> None:
     """A frame or the row in the head: the first difference, and exit status 1."""
     file = _sent(recording, tmp_path)
-    head, *lines = file.read_text(encoding="utf-8").splitlines()
+    head, *lines = read_trace_text(file).splitlines()
     other = json.loads(head)
     other["row"]["min_gap_m"] = "1.234"
     file.write_text("\n".join([json.dumps(other), *lines]) + "\n", encoding="utf-8")
@@ -364,7 +365,7 @@ def test_another_action_is_named_played_anew_and_back(
 ) -> None:
     """Anew the agent chooses otherwise than recorded; back the body goes elsewhere."""
     file = _sent(recording, tmp_path)
-    lines = file.read_text(encoding="utf-8").splitlines()
+    lines = read_trace_text(file).splitlines()
     frame = json.loads(lines[1 + 6])
     frame["actions"][1][0] = min(1.4, frame["actions"][1][0] + 0.25)
     frame["actions"][1][1] += 0.01
@@ -381,7 +382,7 @@ def test_a_trace_of_format_1_is_replayed_and_not_played_back(
 ) -> None:
     """It holds no actions to compare or to play."""
     file = _sent(recording, tmp_path)
-    head, *lines = map(json.loads, file.read_text(encoding="utf-8").splitlines())
+    head, *lines = map(json.loads, read_trace_text(file).splitlines())
     head["format"] = "cavsumo-trace-1"
     for key in ("starts", "waited", "departures", "approaches"):
         del head[key]
@@ -448,7 +449,7 @@ def test_heads_that_do_not_suffice_are_refused(
 ) -> None:
     """What cannot be replayed alone says so."""
     file = _sent(recording, tmp_path)
-    head, *lines = file.read_text(encoding="utf-8").splitlines()
+    head, *lines = read_trace_text(file).splitlines()
     text = "\n".join([json.dumps(json.loads(head) | change), *lines])
     file.write_text(text, encoding="utf-8")
     with pytest.raises(ResultsError, match=words):
@@ -460,9 +461,9 @@ def test_an_episode_of_a_shared_simulation_is_not_replayed_alone(
 ) -> None:
     """Its history is not in the trace."""
     file = _sent(recording, tmp_path)
-    text = file.read_text(encoding="utf-8").replace('"reset": "fresh"', '"reset": "shared"')
+    text = read_trace_text(file).replace('"reset": "fresh"', '"reset": "shared"')
     file.write_text(text, encoding="utf-8")
-    with pytest.raises(ResultsError, match="other episodes used before"):
+    with pytest.raises(ResultsError, match="other episodes had used before"):
         recorded_alone(file)
 
 
@@ -495,7 +496,7 @@ def _sent(recording: Recording, folder: Path) -> Path:
         (folder / source.name).write_bytes(source.read_bytes())
     file = folder / recording.trace_file.name
     elsewhere = str(scenario.net.parent.parent)
-    file.write_text(file.read_text(encoding="utf-8").replace(elsewhere, "/elsewhere"))
+    file.write_text(read_trace_text(file).replace(elsewhere, "/elsewhere"))
     return file
 
 

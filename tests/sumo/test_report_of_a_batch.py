@@ -13,6 +13,7 @@ from report_files import FAILED, HELD
 from cavsumo.cli import main
 from cavsumo.report.analysis import analyse
 from cavsumo.report.formats import FORMATS
+from cavsumo.report.pages.report.scenes import scenes
 from cavsumo.results.reading import read_rows
 from cavsumo.results.traces import read_trace
 
@@ -58,6 +59,32 @@ def test_a_real_batch_in_figures(real: Path) -> None:
         assert distinct.tests.known == distinct.tests.total == len(tests)
     assert sum(found.tests.count for found in report.rates) >= 4, "too few to mean anything"
     assert [c.pairs.total for c in report.comparisons] == [8, 8]
+
+
+def test_a_network_by_name_and_by_path_is_one_setting(
+    networks: Mapping[str, Path], routes: Mapping[str, Path], tmp_path: Path
+) -> None:
+    """Files are what they hold; another network is another setting."""
+    given = {
+        "name": ["-n", "pedestrians", "--seed", "1"],
+        "path": [
+            "-n",
+            str(networks["pedestrians"]),
+            "-r",
+            str(routes["pedestrians"]),
+            "--seed",
+            "2",
+        ],
+        "other": ["-n", str(networks["crossing"]), "-r", "none"],
+    }
+    for name, words in given.items():
+        more = ["--runs", "2", "-e", "5", "-q", "--exit-zero", "-o", str(tmp_path / f"{name}.csv")]
+        assert main(["run", *words, *more]) == 0
+    files = [tmp_path / f"{name}.csv" for name in given]
+    report = analyse(files[:2])
+    assert [(found.setting, found.tests.total) for found in report.rates] == [("", 4)]
+    assert [scene.batches for scene in scenes(report.evidence.batches)] == [[0, 1]]
+    assert len(analyse(files).rates) == 2
 
 
 def test_what_the_traces_tell(real: Path) -> None:

@@ -333,7 +333,7 @@ class Drill:
 
     def _place(self, run: int) -> float:
         """Where the first tester of an episode starts."""
-        lines = traces(self.quiet)[f"run{run:06d}.jsonl"].splitlines()
+        lines = traces(self.quiet)[f"run{run:06d}.jsonl.gz"].splitlines()
         place: float = json.loads(lines[1])["testers"]["tester0"][0]
         return place
 
@@ -471,5 +471,5 @@ def test_the_command_line_plays_errors_again(
     assert main(["run", "--retry-errors"]) in (0, 1)
     printed = capsys.readouterr().out
     assert "could not be run" not in printed
-    assert f"({len(list(file.with_suffix('').glob('*.jsonl')))} traces)" in printed
+    assert f"({len(list(file.with_suffix('').glob('*.jsonl.gz')))} traces)" in printed
     assert_same(file, drill.quiet)

@@ -159,7 +159,7 @@ def test_the_product_is_pure() -> None:
         ),
         (f"[vary]\nseed = {list(range(1001))}", "1001 batches, at most 1000"),
         (f"[vary]\na = [{{ name = '{'x' * 101}' }}]", "more than 100 characters"),
-        ("[vary]\nruns = [1, 2]", "vary.runs varies runs, which is given on the command line"),
+        ("[vary]\nruns = [1, 2]", "vary.runs varies runs, which is given beside the file"),
     ],
 )
 def test_bad_tables_are_one_sentence_with_the_key(text: str, said: str, write: Write) -> None:
@@ -232,7 +232,7 @@ def test_a_study_is_its_batches(home: Path, capsys: pytest.CaptureFixture[str]) 
     part, single = Path("results-testers2.csv"), Path("alone.csv")
     assert untold(rows(part)) == untold(rows(single))
     assert read_manifest(part)["learned"] == read_manifest(single)["learned"]
-    assert len(list(part.with_suffix("").glob("*.jsonl"))) == 4
+    assert len(list(part.with_suffix("").glob("*.jsonl.gz"))) == 4
     before = content(home)
     shutil.rmtree(home / "results-testers2")
     (home / "results-testers2.csv").unlink()

@@ -11,12 +11,11 @@ import libsumo
 import pytest
 
 from cavsumo import cli
-from cavsumo.batch.prepared import prepare
-from cavsumo.model.scenario import BatchPlan, Simulation, plan_from
+from cavsumo.batch.prepared import BEYOND_S, prepare
+from cavsumo.model.scenario import BatchPlan, plan_from
 from cavsumo.network.reader import driving_lanes, is_pavement, read_network
 from cavsumo.network.site import Site
 from cavsumo.network.traffic import APART_M, CLEAR_M
-from cavsumo.sumo.demand import BEYOND_S
 from cavsumo.sumo.world import World
 
 Staged = Callable[..., tuple[BatchPlan, Site]]
@@ -139,29 +138,6 @@ def test_the_ego_enters_and_nobody_jumps(open_world: Opener, name: str) -> None:
                     break
             assert world.teleports == 0
             assert not any("ego" in pair for pair in world.collisions)
-
-
-def test_shared_simulations_have_the_same_traffic(open_world: Opener) -> None:
-    """Drawn traffic departs again as it did when SUMO read it by itself."""
-
-    def who(world: World, simulation: Simulation) -> list[set[str]]:
-        """Who has been there until each timestep; when one leaves is SUMO's random choice."""
-        snapshot = world.reset(7, (), (), simulation=simulation)
-        seen = [{raw[0].id for raw in snapshot.raw_background}]
-        for _ in range(80):
-            following = world.step((), None)
-            if following is None:
-                break
-            seen.append(seen[-1] | {raw[0].id for raw in following.raw_background})
-        return seen
-
-    with open_world("junction", traffic=6, ego_params={"sigma": 0, "speedDev": 0}) as world:
-        own, *shared = (who(world, s) for s in ("own", "new", "same", "same"))
-    assert len(own) > 50
-    assert len(own[-1]) > len(own[0]) > 10
-    for again in shared:
-        common = min(len(own), len(again))
-        assert again[:common] == own[:common]
 
 
 def test_another_density_is_another_batch(

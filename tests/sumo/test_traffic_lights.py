@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from cavsumo.errors import NetworkError, SimulationError
-from cavsumo.model.scenario import BatchPlan, Simulation
+from cavsumo.model.scenario import BatchPlan
 from cavsumo.network.site import Site
 from cavsumo.network.traffic_lights import Pace, arrival, phase_at_start
 from cavsumo.sumo.world import World
@@ -69,9 +69,9 @@ def test_when_an_unhindered_ego_arrives() -> None:
     assert arrival([(1.3, 10.0)], Pace(start=0.0)) == pytest.approx(1.0)
 
 
-def slowest(world: World, simulation: Simulation = "own") -> float:
+def slowest(world: World) -> float:
     """The lowest speed of the ego on its way [m/s]."""
-    snapshot = world.reset(3, (), (), simulation=simulation)
+    snapshot = world.reset(3, (), ())
     speeds = [snapshot.ego.v]
     for _ in range(600):
         following = world.step((), None)
@@ -86,12 +86,12 @@ def slowest(world: World, simulation: Simulation = "own") -> float:
 def test_the_ego_passes_at_green_and_stops_at_red(
     open_world: Opener, junction: str, ego_route: str
 ) -> None:
-    """In SUMO, on empty roads, at real traffic lights; alike in a simulation shared."""
+    """In SUMO, on empty roads, at real traffic lights."""
     where = {"junction": junction, "ego_route": [ego_route], "ego_params": CALM}
     with open_world("junction", signal="green", **where) as world:
-        assert min(slowest(world, s) for s in ("own", "new", "same", "same")) > 2.0
+        assert slowest(world) > 2.0
     with open_world("junction", signal="red", **where) as world:
-        assert max(slowest(world, s) for s in ("own", "new", "same", "same")) < 0.1
+        assert slowest(world) < 0.1
 
 
 def test_a_slow_ego_meets_them_too(open_world: Opener) -> None:

@@ -17,6 +17,7 @@ from support import content
 from cavsumo.cli import main
 from cavsumo.errors import Exit, ResultsError
 from cavsumo.results.reading import inside, read_rows
+from cavsumo.results.trace_file import packed, read_trace_text
 
 PLANTED = "from pathlib import Path\nPath('imported').touch()\n"
 PLANTED += "class Ego:\n    def act(self, snapshot):\n        raise ValueError\n"
@@ -40,11 +41,11 @@ class Sent:
         plan = json.loads(manifest.read_text(encoding="utf-8"))
         plan["plan"]["scenario"] |= scenario
         manifest.write_text(json.dumps(plan), encoding="utf-8")
-        for file in self.csv_file.with_suffix("").glob("*.jsonl"):
-            first, _, rest = file.read_text(encoding="utf-8").partition("\n")
+        for file in self.csv_file.with_suffix("").glob("*.jsonl.gz"):
+            first, _, rest = read_trace_text(file).partition("\n")
             head = json.loads(first)
             head["plan"]["scenario"] |= scenario
-            file.write_text(json.dumps(head) + "\n" + rest, encoding="utf-8")
+            file.write_bytes(packed(json.dumps(head) + "\n" + rest))
 
     def name(self, sort: str) -> None:
         """Have the batch name something of its own."""

@@ -14,7 +14,7 @@ from cavsumo.batch.worker import Worker
 from cavsumo.errors import InputError
 from cavsumo.model.scenario import plan_from
 from cavsumo.results.rows import Outcome
-from cavsumo.results.traces import parsed
+from cavsumo.results.traces import trace_of
 
 SetUp = Callable[..., Any]
 PROGRAMMED = ["timing", "proximity", "programmed-random", "election"]
@@ -76,7 +76,9 @@ def test_an_untriggered_vehicle_waits_for_good(set_up: SetUp, types: tuple[str, 
         trace="all",
     )
     for outcome in outcomes(prepared):
-        (tester,) = parsed(outcome.trace).frames[-1]["testers"].values()
+        trace = trace_of(outcome)
+        assert trace is not None
+        (tester,) = trace.frames[-1]["testers"].values()
         assert tester[2] < 0.5
         assert outcome.row["outcome"] == "not_triggered"
         assert outcome.row["contacts"] == 0
@@ -107,7 +109,9 @@ def test_at_the_end_of_its_way_a_vehicle_comes_to_rest(
         ego_params={"speed": 0.0},
         trace="all",
     )
-    (tester,) = parsed(outcomes(prepared)[0].trace).frames[-1]["testers"].values()
+    trace = trace_of(outcomes(prepared)[0])
+    assert trace is not None
+    (tester,) = trace.frames[-1]["testers"].values()
     assert tester[2] < 0.1
     inside = tester[0] + 2.25 <= 99.0
     assert inside or "merging" in types

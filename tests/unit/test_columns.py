@@ -11,7 +11,7 @@ from cavsumo.batch.replay import first_difference
 from cavsumo.model.scenario import BatchPlan, plan_from
 from cavsumo.results.columns import COLUMNS, markdown_table, measured, row_of
 from cavsumo.results.rows import cell
-from cavsumo.simulation.loop import Episode
+from cavsumo.simulation.episode import Episode
 
 UNITS = {"s": "s", "m": "m", "mps": "m/s", "mps2": "m/s²", "rad": "rad"}
 

@@ -9,6 +9,7 @@ import pytest
 
 from cavsumo.errors import NetworkError
 from cavsumo.network.facts import facts
+from cavsumo.network.net_format import LINE, NUMBER
 from cavsumo.network.reader import read_network
 
 JUNCTION_EDGE = (
@@ -145,3 +146,29 @@ def test_every_network_of_ours_is_read(networks: dict[str, Path]) -> None:
     """With its crossings, traffic lights and rules of priority."""
     for file in networks.values():
         assert read_network(file, foes=True).edges
+
+
+@pytest.mark.parametrize(
+    ("text", "number", "line"),
+    [
+        ("-1.50", True, False),
+        ("+2.", True, False),
+        (" .5 ", True, False),
+        ("1e3", True, False),
+        ("1e9", False, False),
+        ("100000000", True, False),
+        ("100000001", False, False),
+        ("1.2.3", False, False),
+        ("\u0661", False, False),
+        ("1,2 3,4", False, True),
+        ("1,2,0  3e1,.4\t5,6", False, True),
+        ("1,2 3", False, False),
+        ("1,2", False, False),
+        ("1,2 3,4,5,6", False, False),
+        ("1,2 3,100000001", False, False),
+        (",".join(["1" * 50] * 2), False, False),
+    ],
+)
+def test_numbers_and_lines_by_hand(text: str, number: bool, line: bool) -> None:
+    """Written plainly or not, within bounds."""
+    assert (NUMBER.fits(text), LINE.fits(text)) == (number, line)

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from support import frame, json_lines
 
 from cavsumo.agents.recorded import Recorded, RecordedAgent
 from cavsumo.errors import ResultsError
@@ -15,7 +16,7 @@ from cavsumo.model.bodies import CAR, NOOP, Action, Body
 from cavsumo.model.carriageway import StartRecord
 from cavsumo.model.departures import Demand, Stage, Trip, Walk
 from cavsumo.model.snapshot import BodyState, Snapshot
-from cavsumo.results.traces import frame, parsed, read_moments, read_trace, trace_head
+from cavsumo.results.traces import parsed, read_moments, read_trace, trace_head
 
 DEMAND = Demand(
     (Trip(0.3, "a", "t", ("e", "f"), 1, 5.1, 8.0, 1.0417),),
@@ -43,7 +44,7 @@ def text(played: Recorded = PLAYED, damage: Damage = lambda *_: None) -> str:
     head, *frames = json.loads(json.dumps([head, *frames]))
     damage(head, frames)
     # Python's JSON, in which a file may also hold what is no number
-    return "".join(json.dumps(line) + "\n" for line in (head, *frames))
+    return json_lines(head, *frames)
 
 
 def test_a_record_comes_back_from_its_trace() -> None:

@@ -118,6 +118,16 @@ def test_the_declared_names_are_those_that_the_modules_register(constant: str) -
 
 
 @pytest.mark.parametrize(("registry", "name"), SHIPPED, ids=NAMES)
+def test_the_declared_parameters_are_those_of_the_signature(
+    registry: Registry[Any], name: str
+) -> None:
+    """So that a misspelt one is refused before its module is imported."""
+    assert registry.names.parameters(name) == tuple(
+        p.name for p in registry.parameters(name) if (name, p.name) != ("sumo", "attributes")
+    )
+
+
+@pytest.mark.parametrize(("registry", "name"), SHIPPED, ids=NAMES)
 def test_everything_shipped_has_a_summary(registry: Registry[Any], name: str) -> None:
     """Every agent, ego and assertion says in one sentence what it does, in its own words."""
     entry = registry.get(name)

@@ -13,6 +13,7 @@ from pathlib import Path
 
 import pytest
 from report_files import ERROR, FAILED, HELD, JUDGED, NOTHING, SOME, UNFAIR, write
+from support import json_lines
 
 from cavsumo.cli import main
 from cavsumo.errors import InputError
@@ -21,7 +22,7 @@ from cavsumo.report.distinct import Cell, FailureCell, failure_cells
 from cavsumo.report.events import Described, Event, side_ahead, side_hit
 from cavsumo.report.formats import FORMATS, as_table
 from cavsumo.results.columns import COLUMNS
-from cavsumo.results.traces import read_moments, trace_text
+from cavsumo.results.traces import read_moments
 
 Says = Callable[..., str]
 
@@ -99,6 +100,25 @@ def test_what_could_have_been_avoided_and_who_is_to_blame(tmp_path: Path, says: 
     data = json.loads(says(file, "--format", "json"))
     assert data["rates"][0]["blame"]["ego:speed"]["count"] == 2
     assert "blame ego:speed: count,2," in says(file, "--format", "csv")
+
+
+def test_failures_that_only_an_ideal_driver_avoids_are_told(tmp_path: Path, says: Says) -> None:
+    """Apart from the preventable ones, in every format; not where nobody asked."""
+    asked = [
+        (JUDGED[1][0], {**JUDGED[1][1], "avoidable_ideal": 1}),
+        (JUDGED[2][0], {**JUDGED[1][1], "avoidable_ideal": 0}),
+    ]
+    file = write(tmp_path / "asked.csv", asked, reference="human")
+    random, timing = analyse([file]).rates
+    assert random.by_ideal is None
+    assert timing.by_ideal is not None
+    assert (timing.by_ideal.count, timing.by_ideal.total, timing.unpreventable.count) == (1, 2, 2)
+    lines = [line.split() for line in says(file).splitlines()]
+    assert ["preventable", "(ideal", "only)", "1", "of", "2", "tests"] in [x[:7] for x in lines]
+    assert json.loads(says(file, "--format", "json"))["rates"][1]["by_ideal"]["count"] == 1
+    junit = tmp_path / "r.xml"
+    says(file, "--junit", junit)
+    assert "timing.preventable-ideal-only" in junit.read_text(encoding="utf-8")
 
 
 def test_pairs_leave_out_what_either_could_not_play(some: Report) -> None:
@@ -365,7 +385,7 @@ def test_moments_of_a_trace(tmp_path: Path) -> None:
         "time_s": "0.2",
     }
     file = tmp_path / "t.jsonl"
-    file.write_text(trace_text(head, frames), encoding="utf-8")
+    file.write_text(json_lines(head, *frames), encoding="utf-8")
     moments = read_moments(file, [0.1, 0.26, 0.0])
     assert [(driven, frame["step"]) for driven, frame in moments] == [(3.0, 1), (7.0, 2), (0.0, 0)]
 

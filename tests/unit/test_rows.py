@@ -12,6 +12,7 @@ from typing import Any
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
+from support import frame, json_lines
 
 from cavsumo.agents.recorded import Recorded
 from cavsumo.errors import ResultsError
@@ -20,7 +21,8 @@ from cavsumo.model.snapshot import BodyState, Snapshot
 from cavsumo.results.columns import COLUMNS, Row
 from cavsumo.results.reading import FORMAT, read_manifest, read_results, read_rows
 from cavsumo.results.rows import Outcome, cell
-from cavsumo.results.traces import frame, read_trace, trace_head, trace_text
+from cavsumo.results.trace_file import packed, read_trace_text
+from cavsumo.results.traces import read_trace, trace_head
 from cavsumo.results.writing import Recorder
 
 
@@ -48,7 +50,7 @@ def played(run: int, *frames: dict[str, Any], **more: Any) -> Outcome:
     mine = row(run, **more)
     origin: Row = {"plan": {}, "sha256": {}, "versions": {}, "sumo_options": {}}
     head = trace_head(origin, mine, None, [snapshot(0)], Recorded(0, ()))
-    return Outcome(mine, trace_text(head, frames) if frames else "")
+    return Outcome(mine, packed(json_lines(head, *frames)) if frames else b"")
 
 
 @contextmanager
@@ -185,7 +187,7 @@ def test_a_trace_lies_where_its_row_says(tmp_path: Path) -> None:
         returned = recorder.write(played(4, seen(0), seen(1)))
         recorder.write(played(5))
     with_trace, without = read_rows(file)
-    assert with_trace["trace"] == returned["trace"] == "r/run000004.jsonl"
+    assert with_trace["trace"] == returned["trace"] == "r/run000004.jsonl.gz"
     assert read_trace(tmp_path / with_trace["trace"]).frames == [seen(0), seen(1)]
     assert without["trace"] == ""
     assert recorder.traces == 1
@@ -195,7 +197,7 @@ def test_a_trace_begins_with_whose_it_is(tmp_path: Path) -> None:
     """The first line holds the row, but for what no replay repeats, and everybody's box."""
     with recording(tmp_path / "r.csv") as recorder:
         recorder.write(played(4, seen(0)))
-    trace = read_trace(tmp_path / "r" / "run000004.jsonl")
+    trace = read_trace(tmp_path / "r" / "run000004.jsonl.gz")
     assert trace.row == {c: cell(row(4).get(c)) for c in COLUMNS if c not in ("trace", "wall_s")}
     car = ("car", CAR.length, CAR.width, CAR.wheelbase)
     assert trace.shapes()["ego"] == trace.shapes()["car0"] == car
@@ -220,9 +222,9 @@ def test_lines_that_are_no_frames_are_refused(tmp_path: Path, line: str) -> None
     """Keys or numbers missing: one sentence with the file's name."""
     with recording(tmp_path / "r.csv") as recorder:
         recorder.write(played(0, seen(0)))
-    file = tmp_path / "r" / "run000000.jsonl"
-    file.write_text(file.read_text() + line + "\n", encoding="utf-8")
-    with pytest.raises(ResultsError, match=r"run000000\.jsonl"):
+    file = tmp_path / "r" / "run000000.jsonl.gz"
+    file.write_bytes(packed(read_trace_text(file) + line + "\n"))
+    with pytest.raises(ResultsError, match=r"run000000\.jsonl\.gz"):
         read_trace(file)
 
 
@@ -232,7 +234,7 @@ def test_traces_keep_full_precision(tmp_path: Path, x: float) -> None:
     """What is read is bit for bit what was written: a replay is compared with it."""
     with recording(tmp_path / "r.csv") as recorder:
         recorder.write(played(0, seen(0, x)))
-    (again,) = read_trace(tmp_path / "r" / "run000000.jsonl").frames
+    (again,) = read_trace(tmp_path / "r" / "run000000.jsonl.gz").frames
     assert again["ego"][0] == x
     assert math.copysign(1.0, again["ego"][0]) == math.copysign(1.0, x)
 
@@ -257,7 +259,7 @@ def test_the_traces_of_an_earlier_batch_go(tmp_path: Path) -> None:
         with recording(tmp_path / "r.csv") as recorder:
             for run in range(runs):
                 recorder.write(played(run, seen(0)))
-    assert [f.name for f in (tmp_path / "r").iterdir()] == ["run000000.jsonl"]
+    assert [f.name for f in (tmp_path / "r").iterdir()] == ["run000000.jsonl.gz"]
 
 
 @pytest.mark.parametrize(

@@ -6,10 +6,14 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 
 import pytest
+from pydantic import ValidationError
 
+from cavsumo.batch.planned import recorded_settings
+from cavsumo.cli import main
 from cavsumo.errors import InputError, UnknownName
 from cavsumo.model.scenario import BatchPlan, plan_from
 from cavsumo.model.scenario_file import read_config
+from cavsumo.results.provenance import differences
 
 
 @pytest.fixture
@@ -194,3 +198,29 @@ def test_a_scenario_needs_a_network() -> None:
     """Without a network there is nothing to test on, and the message says what to give."""
     with pytest.raises(InputError, match="--net"):
         plan_from({"runs": 3}, "run")
+
+
+# Gone ---------------------------------------------------------------------------------------------
+
+
+def test_a_setting_that_is_gone_is_refused_with_what_is_instead(
+    plan: Callable[..., BatchPlan], capsys: pytest.CaptureFixture[str]
+) -> None:
+    """On the command line, in files and as a keyword."""
+    with pytest.raises(InputError, match="run: reset: every episode has a simulation of its own"):
+        plan(reset="shared")
+    assert main(["run", "--reset", "shared"]) == 2
+    assert "--reset: every episode has a simulation of its own" in capsys.readouterr().err
+
+
+def test_recorded_plans_that_still_have_it_are_read(plan: Callable[..., BatchPlan]) -> None:
+    """With the value of all batches now they are the same plans; with another one they are not."""
+    new = plan()
+    old = new.model_dump(mode="json") | {"reset": "fresh"}
+    assert BatchPlan.model_validate(old) == new
+    parts: dict[str, Mapping[str, str]] = {"versions": {}, "sha256": {}, "sumo_options": {}}
+    now = {"plan": new.model_dump(mode="json"), **parts}
+    assert not list(differences({"plan": old, **parts}, now))
+    assert "reset" not in recorded_settings({"plan": old})
+    with pytest.raises(ValidationError, match="reset shared: every episode has"):
+        BatchPlan.model_validate(old | {"reset": "shared"})

@@ -65,6 +65,21 @@ def test_the_preventable_failures_lead(tmp_path: Path, capsys: pytest.CaptureFix
     assert "first preventable failure: run 2 (timing)" in said
 
 
+def test_failures_that_only_an_ideal_driver_avoids_are_counted(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """They stay unpreventable; nothing is said where the ideal driver was not asked, or judged."""
+    asked = [
+        [judged(human) | {"avoidable_ideal": ideal}] for human, ideal in ((1, 1), (0, 1), (0, 0))
+    ]
+    said = shown(batch(tmp_path / "r.csv", asked), capsys)
+    more = "an ideal driver (full braking at once) would have avoided 1 more"
+    assert f"; apart from that 2 unpreventable; {more}\n" in said
+    assert table(said)["unpreventable"] == "2"
+    assert "more\n" not in shown(batch(tmp_path / "r.csv", EACH), capsys)
+    assert "more\n" not in shown(batch(tmp_path / "r.csv", asked, "ideal"), capsys)
+
+
 def test_without_a_reference_failures_are_failures(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

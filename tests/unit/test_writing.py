@@ -29,7 +29,7 @@ RUNS = 4
 def outcome(run: int, **more: Any) -> Outcome:
     """An episode, those with odd numbers with a trace, those from 2 on with an ego's log."""
     row = {"run": run, "agent": "noop", "outcome": "not_triggered", "time_s": 1.5, "wall_s": 0.25}
-    trace, log = f'{{"run": {run}}}\n' if run % 2 else "", f"said {run}\n" if run >= 2 else ""
+    trace, log = b"%d" % run if run % 2 else b"", f"said {run}\n" if run >= 2 else ""
     return Outcome(row | more, trace, log)
 
 
@@ -121,15 +121,33 @@ def test_traces_behind_the_last_row_go_and_all_others_stay(
     """A trace without a row would be taken for one; whatever else lies there is not ours."""
     write(file, runs=range(2), status="running")
     traces = file.with_suffix("")
-    (traces / "run000002.jsonl").write_text("half a tra", encoding="utf-8")
+    (traces / "run000002.jsonl.gz").write_text("half a tra", encoding="utf-8")
     (traces / "run000777.jsonl").write_text("of a longer batch", encoding="utf-8")
     (traces / "run000778.ego.log").write_text("of a longer batch", encoding="utf-8")
-    for name in ("notes.txt", "runtimes.jsonl", "my-run000777.jsonl", "runs.ego.log"):
+    for name in ("notes.txt", "runtimes.jsonl.gz", "my-run000777.jsonl", "runs.ego.log"):
         (traces / name).write_text("mine", encoding="utf-8")
     resume(file)
     kept = content(file.parent)
     assert {k: v for k, v in kept.items() if v != b"mine"} == whole
     assert len(kept) == len(whole) + 4
+
+
+def test_a_batch_that_began_with_plain_traces_goes_on_with_compressed_ones(file: Path) -> None:
+    """As 0.1 left one: its traces stay, those without a row go, a replaced row's goes too."""
+    write(file, runs=range(3), status="running")
+    folder = file.with_suffix("")
+    (folder / "run000001.jsonl.gz").rename(folder / "run000001.jsonl")
+    file.write_bytes(file.read_bytes().replace(b"run000001.jsonl.gz", b"run000001.jsonl"))
+    (folder / "run000003.jsonl").write_text("half a tra", encoding="utf-8")
+    assert resume(file) == ["0", "1", "2"]
+    kept = [row["trace"] for row in read_rows(file)]
+    assert kept == ["", "r/run000001.jsonl", "", "r/run000003.jsonl.gz"]
+    assert {f.name for f in folder.glob("*.jsonl*")} == {Path(n).name for n in kept if n}
+    with Recorder(file) as recorder:
+        list(recorder.resume(read_manifest(file), iter(range(RUNS))))
+        recorder.replace({1: outcome(1)})
+        assert recorder.traces == 2
+    assert {f.name for f in folder.glob("*.jsonl*")} == {"run000001.jsonl.gz", "run000003.jsonl.gz"}
 
 
 def test_more_episodes_are_appended(file: Path, tmp_path: Path) -> None:
@@ -165,9 +183,9 @@ def test_a_replacement_without_a_trace_removes_the_old_one(file: Path) -> None:
             recorder.write(outcome(run))
         recorder.replace({run: Outcome(outcome(run).row) for run in (1, 2)})
         recorder.finish("finished", {})
-    assert [row["trace"] for row in read_rows(file)] == ["", "", "", "r/run000003.jsonl"]
+    assert [row["trace"] for row in read_rows(file)] == ["", "", "", "r/run000003.jsonl.gz"]
     left = {f.name for f in file.with_suffix("").iterdir()}
-    assert left == {"run000003.jsonl", "run000003.ego.log"}
+    assert left == {"run000003.jsonl.gz", "run000003.ego.log"}
 
 
 def test_replaced_traces_are_counted_once(file: Path) -> None:
@@ -178,7 +196,7 @@ def test_replaced_traces_are_counted_once(file: Path) -> None:
             recorder.write(outcome(run))
         recorder.replace({run: outcome(run) for run in range(RUNS)})
         recorder.finish("finished", {})
-        assert recorder.traces == len(list(file.with_suffix("").glob("*.jsonl"))) == 2
+        assert recorder.traces == len(list(file.with_suffix("").glob("*.jsonl.gz"))) == 2
 
 
 def test_the_lock_survives_a_replacement(file: Path) -> None:
@@ -255,7 +273,7 @@ def test_a_finished_batch_gives_way(file: Path, status: str) -> None:
     write(file, runs=range(8), status=status)
     write(file, runs=range(2))
     assert [row["run"] for row in read_rows(file)] == ["0", "1"]
-    assert [f.name for f in file.with_suffix("").iterdir()] == ["run000001.jsonl"]
+    assert [f.name for f in file.with_suffix("").iterdir()] == ["run000001.jsonl.gz"]
 
 
 WIDTH = len(COLUMNS)
@@ -465,7 +483,7 @@ def test_links_among_results_that_are_continued_are_not_followed(file: Path) -> 
     outside = file.parent.parent / f"{file.parent.name}-outside"
     outside.mkdir()
     file.with_suffix("").mkdir(exist_ok=True)
-    links = {file.with_suffix("") / "run000001.jsonl", file.parent / ".r.json.new"}
+    links = {file.with_suffix("") / "run000001.jsonl.gz", file.parent / ".r.json.new"}
     for link in links:
         link.symlink_to(outside / link.name)
     assert resume(file) == ["0"]

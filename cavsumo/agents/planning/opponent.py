@@ -17,7 +17,6 @@ from __future__ import annotations
 
 import bisect
 import itertools
-import math
 from collections.abc import Iterable, Mapping
 from typing import Any
 
@@ -35,6 +34,7 @@ CHANGE_MPS2 = 0.02  # an acceleration that differs by more is another one
 STANDING_MPS = 0.1
 OLDEST = 11  # ages from here on are one [timesteps]
 PSEUDO = 2.0
+MOST = 1e15  # a count or the amount of a sum of accelerations; larger ones are damaged
 
 Key = tuple[int, int, int]
 
@@ -191,14 +191,14 @@ class Counts:
             raise ValueError("ages have another shape")
         if {len(counts.sums), *map(len, counts.taken.values())} != {len(MIDDLES_MPS2)}:
             raise ValueError(f"expected {len(MIDDLES_MPS2)} classes of acceleration")
-        if not all(math.isfinite(total) for total, _ in counts.sums):
-            raise ValueError("sums must be finite")
+        if not all(abs(total) <= MOST for total, _ in counts.sums):
+            raise ValueError("sums must be finite and not too large")
         return counts
 
 
 def _count(n: int) -> int:
     """A count; ValueError for anything else."""
-    if n != int(n) or n < 0:
+    if n != int(n) or not 0 <= n <= MOST:
         raise ValueError(f"expected a count, got {n!r}")
     return int(n)
 

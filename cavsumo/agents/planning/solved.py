@@ -6,18 +6,14 @@ Stored solutions save time and do not change results.
 
 from __future__ import annotations
 
-import hashlib
 import math
-import os
-import tempfile
-from contextlib import suppress
 from dataclasses import dataclass
 from functools import lru_cache
 from importlib.util import find_spec
-from pathlib import Path
 from typing import Any
 
 from cavsumo.agents.planning.rules import Rules
+from cavsumo.model.cache import keep, kept
 
 PRECISION = 1e-4
 SNAP = 1e-6  # a number this close to a point of the lattice, in cells, is on it
@@ -103,10 +99,10 @@ class Solved:
 def solved(rules: Rules) -> Solved:
     """The solution of a game: from this process, from disk, or solved now."""
     size = math.prod(rules.shape)
-    found = _read(_file(rules), size)
-    if found is None:
+    found = kept(_entry(rules))
+    if found is None or len(found) != 9 * size:
         found = _solve(rules)
-        _write(_file(rules), found)
+        keep(_entry(rules), found)
     values: memoryview[float] = memoryview(found[: 8 * size]).cast("d")
     return Solved(rules, memoryview(found[8 * size :]), values)
 
@@ -123,42 +119,7 @@ def _solve(rules: Rules) -> bytes:
     return found
 
 
-def cache_folder() -> Path:
-    """The folder of the solutions: ``$XDG_CACHE_HOME/cavsumo`` or ``~/.cache/cavsumo``."""
-    home = os.environ.get("XDG_CACHE_HOME", "")
-    base = Path(home) if Path(home).is_absolute() else Path.home() / ".cache"
-    return base / "cavsumo"
-
-
-def _file(rules: Rules) -> Path | None:
-    """The file of a solution; a different one with compiled sweeps, as the last digits differ."""
+def _entry(rules: Rules) -> str:
+    """The name of a solution on disk; compiled sweeps have another, as the last digits differ."""
     compiled = "-numba" if find_spec("numba") else ""
-    try:
-        return cache_folder() / f"game-{rules.key[:32]}{compiled}.bin"
-    except RuntimeError:  # no home
-        return None
-
-
-def _read(file: Path | None, size: int) -> bytes | None:
-    """The solution in a file, None if it is incomplete: a checksum precedes it."""
-    with suppress(OSError):
-        data = file.read_bytes() if file else b""
-        check, body = data[:32], data[32:]
-        if len(body) == 9 * size and hashlib.sha256(body).digest() == check:
-            return body
-    return None
-
-
-def _write(file: Path | None, body: bytes) -> None:
-    """Store a solution atomically; if that is impossible, continue without."""
-    if file is None:
-        return
-    with suppress(OSError):
-        file.parent.mkdir(parents=True, exist_ok=True)
-        with tempfile.NamedTemporaryFile(dir=file.parent, delete=False) as stream:
-            try:
-                stream.write(hashlib.sha256(body).digest() + body)
-                stream.close()
-                Path(stream.name).replace(file)
-            except OSError:
-                Path(stream.name).unlink()
+    return f"game-{rules.key[:32]}{compiled}.bin"

@@ -18,6 +18,7 @@ from rich.table import Table
 
 from cavsumo.batch.ended import Ended
 from cavsumo.batch.tally import Found
+from cavsumo.model.scenario import NO_REFERENCE
 from cavsumo.results.reading import rows_of
 from cavsumo.results.statistics import lower_bound
 
@@ -32,8 +33,8 @@ class Guarantee:
     Attributes:
         label, ego, params: which.
         found: the counts of its episodes.
-        triggered, violated: lower bounds on the probability that an episode is a test, and that the
-            ego fails it.
+        triggered, prevented, violated: lower bounds on the probability that an episode is a test,
+            that the ego fails it preventably, and that it fails it at all.
         alike: all episodes have equal results.
     """
 
@@ -42,26 +43,40 @@ class Guarantee:
     params: Mapping[str, Any]
     found: Found
     triggered: float
+    prevented: float
     violated: float
     alike: bool
 
 
 @dataclass(frozen=True)
 class TriggerCertificate:
-    """The bounds against all egos jointly, each of the two with the confidence.
+    """The bounds against all egos jointly, each of the three with the confidence.
 
     Attributes:
         guarantees: ego by ego.
-        confidence: of all bounds on triggering together, and of all on violation together.
+        confidence: of all bounds on triggering together, of all on preventable violation, and of
+            all on violation.
+        reference: the reference driver that judged the failures; "none" for nobody.
     """
 
     guarantees: Sequence[Guarantee]
     confidence: float
+    reference: str
 
     @property
     def triggered(self) -> float:
         """The least bound on triggering."""
         return min(one.triggered for one in self.guarantees)
+
+    @property
+    def prevented(self) -> float:
+        """The least bound on preventable violation."""
+        return min(one.prevented for one in self.guarantees)
+
+    @property
+    def judged(self) -> bool:
+        """Whether a reference driver judged the failures."""
+        return self.reference != NO_REFERENCE
 
     @property
     def violated(self) -> float:
@@ -78,11 +93,19 @@ def certified(
     def guarantee(one: Ended, label: str) -> Guarantee:
         found, (ego, params) = one.tally.all, egos[label]
         n = found.episodes
-        tests, failures = (lower_bound(k, n, level) for k in (found.tests, found.failures))
-        return Guarantee(label, ego, params, found, tests, failures, _alike(one.csv_file))
+        return Guarantee(
+            label,
+            ego,
+            params,
+            found,
+            triggered=lower_bound(found.tests, n, level),
+            prevented=lower_bound(found.preventable, n, level),
+            violated=lower_bound(found.failures, n, level),
+            alike=_alike(one.csv_file),
+        )
 
     guarantees = [guarantee(one, label) for one, label in zip(ended, egos, strict=True)]
-    return TriggerCertificate(guarantees, confidence)
+    return TriggerCertificate(guarantees, confidence, ended[0].reference)
 
 
 def _alike(csv_file: Path) -> bool:
@@ -97,7 +120,9 @@ def as_json(found: TriggerCertificate) -> dict[str, Any]:
     return {
         "confidence": found.confidence,
         "triggered_at_least": found.triggered,
+        "preventable_at_least": found.prevented if found.judged else None,
         "violated_at_least": found.violated,
+        "reference": found.reference,
         "egos": [
             {
                 "label": one.label,
@@ -105,11 +130,13 @@ def as_json(found: TriggerCertificate) -> dict[str, Any]:
                 "params": dict(one.params),
                 "runs": one.found.episodes,
                 "tests": one.found.tests,
+                "preventable": one.found.preventable if found.judged else None,
                 "failures": one.found.failures,
                 "unfair": one.found.unfair,
                 "invalid": one.found.invalid,
                 "errors": one.found.errors,
                 "triggered_at_least": one.triggered,
+                "preventable_at_least": one.prevented if found.judged else None,
                 "violated_at_least": one.violated,
                 "all_alike": one.alike,
             }
@@ -119,12 +146,12 @@ def as_json(found: TriggerCertificate) -> dict[str, Any]:
 
 
 def as_table(found: TriggerCertificate) -> Table:
-    """One line per ego, and the least of all."""
+    """One line per ego, and the least of all; preventable failures first, if they were judged."""
     table = Table(box=None, pad_edge=False, padding=(0, 2, 0, 0))
     table.add_column("ego", overflow="fold")
-    for title in ("runs", "tests", "at least", "failures", "at least"):
-        table.add_column(title, justify="right", no_wrap=True)
-    for title in ("unfair", "invalid", "errors"):
+    judged = ("preventable", "at least") if found.judged else ()
+    counted = ("runs", "tests", "at least", *judged, "failures", "at least")
+    for title in (*counted, "unfair", "invalid", "errors"):
         table.add_column(title, justify="right", no_wrap=True)
     for one in found.guarantees:
         counts = one.found
@@ -133,12 +160,14 @@ def as_table(found: TriggerCertificate) -> Table:
             str(counts.episodes),
             str(counts.tests),
             rounded_down(one.triggered),
+            *((str(counts.preventable), rounded_down(one.prevented)) if judged else ()),
             str(counts.failures),
             rounded_down(one.violated),
             *map(str, (counts.unfair, counts.invalid, counts.errors)),
         )
-    least = rounded_down(found.triggered), rounded_down(found.violated)
-    table.add_row("least of all", "", "", least[0], "", least[1])
+    prevented = ("", rounded_down(found.prevented)) if judged else ()
+    least = "", "", rounded_down(found.triggered), *prevented, "", rounded_down(found.violated)
+    table.add_row("least of all", *least)
     return table
 
 
@@ -156,6 +185,12 @@ def sentences(found: TriggerCertificate) -> list[str]:
         f"With {100 * found.confidence:g} % confidence an episode is a test with probability at "
         f"least {rounded_down(found.triggered)}, {against}; it holds for no other ego."
     ]
+    failed = any(one.found.failures for one in found.guarantees)
+    if failed and not found.judged:
+        said.append(
+            "No reference driver judged the failures, as none did in these results: nobody may "
+            "have been able to prevent them."
+        )
     for one in found.guarantees:
         if one.alike and one.found.episodes > 1:
             said.append(

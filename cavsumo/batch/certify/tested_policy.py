@@ -27,7 +27,7 @@ from cavsumo.results.traces import Trace
 
 # Settings of results that do not belong to the test: agents, egos, numbers of runs, storage.
 OTHERS = EXTENT - {"deadline_s"} | {
-    *("agents", "params", "known", "seed", "shard", "reset", "trace", "reference"),
+    *("agents", "params", "known", "seed", "shard", "reset", "trace"),
     *("ego", "ego_params", "starts_seed"),
 }
 
@@ -42,7 +42,8 @@ class Subject:
         params: the agent's parameters.
         known: its knowledge at the beginning of every episode, by label.
         starts_seed: the seed of the episode whose starts it keeps; None to draw them anew.
-        starts: those starts, x, y and o of each tester's body, where they were recorded.
+        starts: those starts, x, y and o of each tester's body, where they were recorded; drawn
+            again, they must be the same.
         told: the starts that the agent knows and that are not drawn; empty for none.
         approaches: the types of approach among which theirs were numbered.
     """
@@ -112,7 +113,6 @@ def settings_of(
         "runs": runs,
         "seed": seed,
         "trace": "none",
-        "reference": "none",
     }
     if subject.starts_seed is not None:
         settings["starts_seed"] = subject.starts_seed
@@ -130,9 +130,16 @@ def starts_seed(record: Record) -> int:
 
 
 def _starts(record: Record) -> list[tuple[float, float, float]] | None:
-    """The starts of an episode's testers, if there is a trace."""
+    """The starts that were drawn for an episode's testers, if there is a trace.
+
+    Where somebody stood when the ego entered, a tester waited at the drawn one and began elsewhere;
+    a trace of format 1 tells only where it began.
+    """
     if record.trace is None:
         return None
+    if record.trace.has_recording:
+        played = recording_of(record, record.trace)
+        return [(start.x, start.y, start.o) for start in played.waited or played.starts]
     return [(x, y, o) for x, y, _, o in record.trace.frames[0]["testers"].values()]
 
 

@@ -17,6 +17,7 @@ from cavsumo.errors import InputError, ResultsError
 from cavsumo.model.documents import json_of, read_text
 from cavsumo.model.scenario import BatchPlan
 from cavsumo.model.seeds import episode_seed
+from cavsumo.model.visible_files import is_visible
 from cavsumo.results.present import present_paths
 from cavsumo.results.reading import FORMAT, rows_of
 from cavsumo.results.recorded_plan import recorded_plan
@@ -78,7 +79,7 @@ def used(results: Sequence[Path], params: Mapping[str, Any]) -> Used:
 
 def _is_there(csv_file: Path) -> bool:
     """Whether there is the manifest of results."""
-    return csv_file.with_suffix(".json").is_file()
+    return is_visible(csv_file.with_suffix(".json"))
 
 
 def _kept(plan: BatchPlan, manifest: Mapping[str, Any], csv_file: Path) -> dict[str, Path]:
@@ -109,7 +110,7 @@ def _seeds_of(csv_file: Path, plan: BatchPlan) -> set[int]:
 def _files_in(params: Mapping[str, Any]) -> tuple[list[Path], list[Path]]:
     """The JSON files among parameters: results by their manifests, and other files."""
     named = [Path(value) for value in params.values() if isinstance(value, str)]
-    files = [file for file in named if file.suffix == ".json" and file.is_file()]
+    files = [file for file in named if file.suffix == ".json" and is_visible(file)]
     known = [file for file in files if _is_manifest(file)]
     return [f.with_suffix(".csv") for f in known], [f for f in files if f not in known]
 

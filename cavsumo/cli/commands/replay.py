@@ -11,12 +11,13 @@ from cavsumo.batch.prepared import PreparedBatch, manifest
 from cavsumo.batch.replay import Record, recorded, recorded_alone
 from cavsumo.batch.replaying import play_again, play_back
 from cavsumo.batch.shown import shown_site
-from cavsumo.cli.requests.replay import TRACE, ReplayOptions
+from cavsumo.cli.requests.replay import ReplayOptions
 from cavsumo.cli.steps import SlowSteps, say_written
 from cavsumo.errors import Exit, InputError
 from cavsumo.interop.fcd import write_fcd
 from cavsumo.network.site import Site
 from cavsumo.results.provenance import changes
+from cavsumo.results.trace_file import is_trace
 from cavsumo.results.traces import Trace
 
 
@@ -70,7 +71,7 @@ def _taken(record: Record, wanted: ReplayOptions) -> tuple[Record, Trace | None,
 def _found(file: Path, wanted: ReplayOptions) -> Record:
     """The episode that is meant."""
     allowed = None if wanted.trust else ()
-    if file.suffix == TRACE:
+    if is_trace(file):
         return recorded_alone(file, allowed, anew=not wanted.playback)
     assert wanted.run is not None
     return recorded(file, wanted.run, allowed)

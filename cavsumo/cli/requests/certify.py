@@ -9,7 +9,7 @@ from pathlib import Path
 from cavsumo.batch.certify.ego_list import opponents
 from cavsumo.batch.certify.tested_names import check_test
 from cavsumo.batch.manner import Means
-from cavsumo.egos.names import EGO_NAMES
+from cavsumo.egos.names import check_ego
 from cavsumo.errors import InputError
 from cavsumo.model.scenario import Params
 from cavsumo.results.reading import read_manifest
@@ -63,9 +63,8 @@ def check_certify(order: CertifyOptions) -> None:
     _check_numbers(order)
     Means(order.jobs)
     plan, _ = recorded_plan(order.results)
-    for ego, _ in opponents(order.egos, order.ego_param, plan.scenario).values():
-        if ":" not in ego:
-            EGO_NAMES.check(ego)
+    for ego, params in opponents(order.egos, order.ego_param, plan.scenario).values():
+        check_ego(ego, params)
     for file in order.apart:
         read_manifest(file)
     if not order.test.isdecimal():

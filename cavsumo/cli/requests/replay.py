@@ -8,8 +8,7 @@ from pathlib import Path
 from cavsumo.cli.requests.files import check_folder
 from cavsumo.errors import InputError, ResultsError
 from cavsumo.results.reading import read_manifest
-
-TRACE = ".jsonl"  # how the name of a trace ends
+from cavsumo.results.trace_file import is_trace
 
 
 @dataclass(frozen=True)
@@ -48,7 +47,7 @@ def check_replay(file: Path, wanted: ReplayOptions) -> None:
     for option, output in (("--html", wanted.html), ("--fcd", wanted.fcd)):
         if output is not None:
             check_folder(option, output)
-    if file.suffix != TRACE:
+    if not is_trace(file):
         if wanted.run is None:
             raise InputError(f"replay: which run of {str(file)!r}? name its number")
         read_manifest(file)

@@ -11,7 +11,9 @@ from cavsumo.model.lazily import lazily
 if TYPE_CHECKING:
     from cavsumo.egos.reference.base import REFERENCES, Reference
 
-__all__ = ["REFERENCES", "Reference"]
+__all__ = ["IDEAL", "REFERENCES", "Reference"]
+
+IDEAL = "ideal"  # the driver that is asked besides the one that a batch is judged by
 
 __getattr__ = lazily(
     __name__, dict.fromkeys(("REFERENCES", "Reference"), "cavsumo.egos.reference.base")

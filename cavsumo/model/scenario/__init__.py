@@ -11,13 +11,12 @@ from cavsumo.model.scenario.parsing import (
     SCENARIO_KEYS,
     SENSOR_KEYS,
     check_keys,
+    check_teams,
     plan_from,
 )
 from cavsumo.model.scenario.plan import (
     NO_REFERENCE,
-    SHARED_BY,
     BatchPlan,
-    Simulation,
     half_width,
     part_of,
 )
@@ -28,12 +27,11 @@ __all__ = [
     "PLAN_KEYS",
     "SCENARIO_KEYS",
     "SENSOR_KEYS",
-    "SHARED_BY",
     "BatchPlan",
     "Params",
     "Scenario",
-    "Simulation",
     "check_keys",
+    "check_teams",
     "half_width",
     "part_of",
     "plan_from",

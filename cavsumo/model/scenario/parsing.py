@@ -8,14 +8,16 @@ from typing import Any
 
 from pydantic import ValidationError
 
-from cavsumo.errors import InputError, UnknownName, shown
+from cavsumo.errors import InputError, UnknownName, plain, shown
 from cavsumo.model.documents import first_problem
-from cavsumo.model.named_networks import check_network, is_named, routes_of
+from cavsumo.model.named_networks import check_network, is_named, named_routes, routes_of
 from cavsumo.model.scenario.fields import settings as offered
+from cavsumo.model.scenario.gone import GONE
 from cavsumo.model.scenario.plan import BatchPlan
 from cavsumo.model.scenario.record import Scenario
 from cavsumo.model.scenario.sensor import Sensor
 from cavsumo.model.sumo_configuration import with_configuration
+from cavsumo.model.visible_files import is_visible
 
 SCENARIO_KEYS = frozenset(Scenario.model_fields)
 PLAN_KEYS = frozenset(BatchPlan.model_fields) - {"scenario"}
@@ -46,7 +48,7 @@ def plan_from(
     scenario = {k: v for k, v in settings.items() if k in SCENARIO_KEYS}
     if str(scenario.get("traffic")) == "none":
         del scenario["traffic"]
-    scenario["routes"] = _route_file(scenario, source)
+    scenario["routes"] = _route_file(scenario, places, source)
     try:
         plan = BatchPlan(
             scenario=Scenario(**scenario).placed(places),
@@ -61,23 +63,33 @@ def plan_from(
 def _check_together(plan: BatchPlan, source: str) -> None:
     """Refuse files that are not there, and settings that do not go together."""
     for file in (plan.scenario.routes_file, *plan.scenario.additional_files):
-        if file is not None and not file.is_file():
-            raise InputError(f"{source}: no such file: {str(file)!r}")
+        try:
+            if file is not None and not file.is_file():
+                raise InputError(f"{source}: no such file: {str(file)!r}")
+        except OSError as error:
+            raise InputError(f"{source}: {plain(error)}") from error
     if plan.shard and (plan.first or plan.until_tests or plan.until_half_width):
         raise InputError(
             f"{source}: a shard sees its own rows only; first, until_tests and until_half_width "
             "need the whole batch"
         )
-    if plan.scenario.testers % plan.scenario.bodies_per_agent:
+    check_teams(plan.scenario, source)
+
+
+def check_teams(scenario: Scenario, source: str) -> None:
+    """Refuse testers that cannot be divided among agents."""
+    if scenario.testers % scenario.bodies_per_agent:
         raise InputError(
-            f"{source}: bodies_per_agent {plan.scenario.bodies_per_agent} does not divide "
-            f"testers {plan.scenario.testers}"
+            f"{source}: bodies_per_agent {scenario.bodies_per_agent} does not divide "
+            f"testers {scenario.testers}"
         )
 
 
 def check_keys(settings: Mapping[str, Any], source: str) -> None:
     """Refuse keys that no setting has."""
     for key in settings:
+        if key in GONE:
+            raise InputError(f"{source}: {key}: {GONE[key].words}")
         if key not in SCENARIO_KEYS | PLAN_KEYS:
             raise UnknownName("key", key, SCENARIO_KEYS | PLAN_KEYS, source)
     for sensor in SENSOR_KEYS:
@@ -87,7 +99,9 @@ def check_keys(settings: Mapping[str, Any], source: str) -> None:
                 raise UnknownName(f"key of {sensor}", key, Sensor.model_fields, source)
 
 
-def _route_file(scenario: Mapping[str, Any], source: str) -> Path | None:
+def _route_file(
+    scenario: Mapping[str, Any], places: Mapping[str, Path], source: str
+) -> Path | None:
     """The route file named, the one belonging to the network, or None.
 
     Traffic that is drawn takes the place of the one that would be found, not of one that is named.
@@ -99,14 +113,16 @@ def _route_file(scenario: Mapping[str, Any], source: str) -> Path | None:
             f"{shown(scenario['traffic'])}, not both; routes none or traffic none leaves one"
         )
     if given is not None or drawn:
-        return None if given is None or str(given) == "none" else Path(given)
+        if given is None or str(given) == "none":
+            return None
+        return Path(given) if str(given) in places else named_routes(Path(given), source)
     net = Path(scenario["net"])
     if is_named(net):
         return routes_of(net)
     stem = net.name.removesuffix(".gz").removesuffix(".xml").removesuffix(".net")
     for folder in (net.parent.parent / "routes", net.parent):
         file = folder / f"{stem}.rou.xml"
-        if file.is_file():
+        if is_visible(file):
             return file
     return None
 

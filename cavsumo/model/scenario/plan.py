@@ -3,21 +3,19 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Annotated, Any, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationInfo, field_validator
+from pydantic import BaseModel, ConfigDict, Field, ValidationInfo, field_validator, model_validator
 
 from cavsumo.model.labels import cast_of
+from cavsumo.model.scenario.gone import GONE, without_gone
 from cavsumo.model.scenario.option import Option
 from cavsumo.model.scenario.params import Params, qualified
 from cavsumo.model.scenario.record import Scenario
 from cavsumo.model.scenario.sensor import Finite
 
-SHARED_BY = 25  # episodes that share one simulation when asked to
 NO_REFERENCE = "none"  # in place of a reference driver's name: violations are not judged
-# Whose simulation an episode is played in: its own, or one that later episodes use as the same.
-Simulation = Literal["own", "new", "same"]
 
 
 class BatchPlan(BaseModel):
@@ -59,11 +57,6 @@ class BatchPlan(BaseModel):
     deadline_s: Annotated[Finite, Option("batch", ("--deadline",), "S")] = Field(
         120.0, gt=0, description="real time that an episode may take [s]"
     )
-    reset: Annotated[Literal["fresh", "shared"], Option("batch")] = Field(
-        "fresh",
-        description="begin every episode in a simulation of its own, or search in a shared one for "
-        "many episodes and play each test found again in its own",
-    )
     shard: Annotated[str | None, Option("processes", metavar="I/N", unset="all of it")] = Field(
         None,
         description="play part I of N of the episodes; cavsumo merge puts the parts together",
@@ -93,6 +86,17 @@ class BatchPlan(BaseModel):
     trace: Annotated[Literal["none", "tests", "all"], Option("output")] = Field(
         "tests", description="episodes whose frames are kept"
     )
+
+    @model_validator(mode="before")
+    @classmethod
+    def _without_gone(cls, value: Any) -> Any:
+        """A plan that 0.1 recorded, without the settings that are gone; they had one value."""
+        if not isinstance(value, Mapping):
+            return value
+        kept = without_gone(value)
+        for key in GONE.keys() & kept.keys():
+            raise ValueError(f"{key} {kept[key]}: {GONE[key].words}")
+        return kept
 
     @field_validator("params", mode="before")
     @classmethod
@@ -131,19 +135,15 @@ class BatchPlan(BaseModel):
         """The names of the agents by their labels, in the order in which they take turns."""
         return cast_of(self.agents)
 
-    @property
-    def block(self) -> int:
-        """How many episodes in a row share one simulation, and are played by one process."""
-        return SHARED_BY if self.reset == "shared" else 1
-
     def todo(self) -> Iterator[int]:
         """The numbers of the episodes, those of the shard only if there is one.
 
-        Shards take turns, with one episode of all agents or with the episodes that share one
-        simulation, so that an episode is the same in every shard.
+        Shards take turns, with one episode of all agents, so that an episode is the same in every
+        shard.
         """
         part, parts = part_of(self.shard) if self.shard else (1, 1)
-        total, turn = self.runs * len(self.agents), max(self.block, len(self.agents))
+        turn = len(self.agents)
+        total = self.runs * turn
         for start in range((part - 1) * turn, total, parts * turn):
             yield from range(start, min(start + turn, total))
 

@@ -46,7 +46,11 @@ class Scenario(BaseModel):
             "FILE",
             "routes/NAME.rou.xml when it exists and no traffic is drawn",
         ),
-    ] = Field(None, description="background demand, or none for empty roads")
+    ] = Field(
+        None,
+        description="background demand: a .rou.xml, the name of a network of cavsumo's for its "
+        "demand, or none for empty roads",
+    )
     traffic: Annotated[
         tuple[float, float] | None, Option("scenario", metavar="DENSITY", unset="not drawn")
     ] = Field(

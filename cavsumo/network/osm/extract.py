@@ -18,7 +18,7 @@ from typing import Any, NamedTuple, TextIO
 from xml.etree import ElementTree
 from xml.sax.saxutils import quoteattr
 
-from cavsumo.errors import InputError, shown
+from cavsumo.errors import InputError, plain, shown
 from cavsumo.network.osm.xml_stream import Element, read_elements
 
 Box = tuple[float, float, float, float]  # west, south, east, north [degrees]
@@ -269,7 +269,7 @@ def _pbf_items(file: Path) -> Iterator[Item]:
         for item in osmium.FileProcessor(str(file)):
             yield _from_osmium(item)
     except (RuntimeError, OSError) as error:
-        raise InputError(f"extract {str(file)!r}: not a .pbf extract: {error}") from error
+        raise InputError(f"extract {str(file)!r}: not a .pbf extract: {plain(error)}") from error
 
 
 def _from_osmium(item: Any) -> Item:

@@ -17,7 +17,7 @@ from pathlib import Path
 from textwrap import shorten
 from xml.sax.saxutils import quoteattr
 
-from cavsumo.errors import InputError
+from cavsumo.errors import InputError, plain
 from cavsumo.network.osm.extract import EXTRA
 
 ODBL = (
@@ -102,7 +102,7 @@ def netconvert(
             f"netconvert was stopped after {time_limit_s:g} s: cut a smaller part with --bbox"
         ) from None
     except OSError as error:
-        raise InputError(f"netconvert cannot be run: {error}") from error
+        raise InputError(f"netconvert cannot be run: {plain(error)}") from error
     said = (done.stderr + done.stdout).decode("utf-8", "replace")
     lines = said.replace(str(home), "$SUMO_HOME").replace(f"{folder}{os.sep}", "").splitlines()
     if done.returncode != 0:

@@ -8,6 +8,7 @@ from typing import Any
 from cavsumo.assertions.base import HELD, INVALID, UNFAIR, VIOLATED
 from cavsumo.batch.replay import Record
 from cavsumo.egos import EGOS
+from cavsumo.egos.reference import IDEAL
 from cavsumo.model.scenario import Scenario
 from cavsumo.results.traces import Trace
 
@@ -71,9 +72,13 @@ def facts(record: Record, trace: Trace) -> list[tuple[str, str]]:
 
 
 def _preventable(row: Mapping[str, str]) -> str:
-    """Whether the reference driver would have avoided it; empty if that was not judged."""
-    answer = {"1": "yes", "0": "no"}.get(row.get("avoidable", ""))
-    return f"{answer}, by the driver {row['reference']!r}" if answer else ""
+    """Whether the reference drivers would have avoided it; empty if that was not judged."""
+    reference = row.get("reference", "")
+    asked = {reference: row.get("avoidable", "")}
+    if reference != IDEAL:
+        asked[IDEAL] = row.get("avoidable_ideal", "")
+    answers = {driver: {"1": "yes", "0": "no"}.get(cell) for driver, cell in asked.items()}
+    return "; ".join(f"{said}, by the driver {who!r}" for who, said in answers.items() if said)
 
 
 def ego_words(scenario: Scenario) -> str:

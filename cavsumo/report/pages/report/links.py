@@ -16,6 +16,7 @@ import pandas
 from cavsumo.batch.replay import Record
 from cavsumo.errors import InputError
 from cavsumo.report.analysis import Report
+from cavsumo.report.distinct import JUDGED
 from cavsumo.report.load import Batch
 from cavsumo.report.order import Tell
 from cavsumo.report.pages.replay.page import write_page
@@ -61,25 +62,24 @@ class LinkedRun:
 def chosen(report: Report, pages: int) -> tuple[list[LinkedRun], list[LinkedRun]]:
     """Failures and passed tests to be listed, those to be shown as pages first."""
     rows = report.evidence.rows
-    settings = {int(i): group.setting for group in report.groups for i in group.rows.index}
     failures, tests = (rows[rows["outcome"] == what] for what in ("violated", "held"))
     alike = {(cell.file, cell.run): cell.count for cell in report.failures}
     firsts = {key: rank for rank, key in enumerate(alike)}
     keys = list(zip(failures["file"], failures["run"], strict=True))
-    kinds = [ORDER.index(failure_kind(row)) for row in failures.to_dict("records")]
+    told = zip(*(failures[name] for name in JUDGED), strict=True)
+    kinds = [ORDER.index(failure_kind(dict(zip(JUDGED, cells, strict=True)))) for cells in told]
     order = sorted(range(len(keys)), key=lambda i: (kinds[i], firsts.get(keys[i], len(firsts)), i))
     picked = failures.iloc[order[: max(FAILURES, pages)]]
     spread = np.linspace(0, len(tests) - 1, min(len(tests), pages // 2 or TESTS))
     return (
-        _looks(report, picked, settings, alike),
-        _looks(report, tests.iloc[np.round(spread).astype(int)], settings, {}),
+        _looks(report, picked, alike),
+        _looks(report, tests.iloc[np.round(spread).astype(int)], {}),
     )
 
 
 def _looks(
     report: Report,
     rows: pandas.DataFrame,
-    settings: Mapping[int, str],
     alike: Mapping[tuple[str, int], int],
 ) -> list[LinkedRun]:
     """Rows as runs for inspection."""
@@ -94,7 +94,7 @@ def _looks(
             run=run,
             agent=row.agent,
             tester=row.tester,
-            setting=settings[int(row.Index)],
+            setting=next(g.setting for g in report.groups if row.Index in g.rows.index),
             failed=failed,
             kind=failure_kind(row._asdict()),
             time=float(row.violation_time_s if failed else row.trigger_time_s),

@@ -12,6 +12,7 @@ from typing import Any, NamedTuple
 
 from cavsumo.network.drawing.place import View, site_drawn
 from cavsumo.report.analysis import Report
+from cavsumo.report.compare import EVENTS
 from cavsumo.report.events import Event
 from cavsumo.report.pages.report.scenes import BatchPlace
 
@@ -100,10 +101,8 @@ def maps(report: Report, scenes: Sequence[BatchPlace]) -> list[Map]:
 def _spots(report: Report) -> Iterator[tuple[int, Spot]]:
     """All events whose place is known, each with its batch."""
     for i, group in enumerate(report.groups):
-        for index, batch in group.rows["batch"].items():
-            test = report.tests.get(int(index))
-            if test is None:
-                continue
+        for index, batch in group.rows.loc[EVENTS["tests"](group.rows), "batch"].items():
+            test = report.tests[int(index)]
             sort = PASSED if test.impact is None else FAILED
             events: list[tuple[str, Event | None]] = [(sort, test.trigger), (IMPACT, test.impact)]
             for what, event in events:

@@ -11,6 +11,7 @@ from cavsumo.batch.shown import is_ours, shown_site
 from cavsumo.errors import CavsumoError
 from cavsumo.model.scenario import BatchPlan
 from cavsumo.network.site import Site
+from cavsumo.report.grouping import by_content
 from cavsumo.report.load import Batch
 from cavsumo.results.reading import inside, whole_lines
 from cavsumo.results.traces import Trace, read_trace
@@ -36,11 +37,13 @@ class BatchPlace:
 
 
 def scenes(batches: Sequence[Batch]) -> list[BatchPlace]:
-    """The scenes of all batches, in their order; those of equal scenarios are one."""
+    """The scenes of all batches, in their order; those of equal scenarios are one, wherever their
+    files are.
+    """
     found: dict[str, BatchPlace] = {}
     for i, batch in enumerate(batches):
-        checksums = sorted(dict(batch.manifest.get("sha256") or {}).items())
-        key = repr((batch.plan.scenario, checksums))
+        files = by_content(batch.manifest)
+        key = repr((files["plan"]["scenario"], sorted(files["sha256"].items())))
         if key not in found:
             found[key] = _scene(batch)
         elif found[key].site is None:  # its files may lie beside these results

@@ -5,7 +5,7 @@ from __future__ import annotations
 import shlex
 from collections.abc import Iterator, Sequence
 
-from cavsumo.batch.sentences import driver
+from cavsumo.batch.sentences import driver, others
 from cavsumo.batch.summary import interval, percent
 from cavsumo.errors import CavsumoError
 from cavsumo.model.scenario import Scenario
@@ -83,10 +83,9 @@ def answer(one: Rates, who: str) -> str:
 
 def _judged(one: Rates) -> str:
     """The driver that would have prevented the failures, and apart from them the others."""
-    others = ((one.unpreventable.count, "unpreventable"), (one.not_judged, "not judged"))
-    apart = ", ".join(f"{count} {kind}" for count, kind in others if count)
-    said = f"preventable by {driver(one.reference)}"
-    return f"{said}; apart from that {apart}" if apart else said
+    ideal = one.by_ideal.count if one.by_ideal else None
+    rest = others(one.unpreventable.count, one.not_judged, ideal)
+    return f"preventable by {driver(one.reference)}{rest}"
 
 
 def certainty(report: Report) -> str:

@@ -1,0 +1,29 @@
+"""When an episode ends."""
+
+from __future__ import annotations
+
+from cavsumo.model.scene import Scene
+from cavsumo.model.snapshot import Snapshot
+from cavsumo.simulation.setup import Setup
+
+# An episode whose verdict is open at the horizon may run on for this long [s].
+OVERTIME_S = 15.0
+
+
+def over(setup: Setup, snapshot: Snapshot) -> bool:
+    """The terminator psi: every assertion decided, or the horizon with none pending."""
+    for assertion in setup.assertions:
+        if not assertion.decided:
+            break
+    else:
+        return True
+    left = setup.scenario.end - snapshot.time
+    if left > 1e-9:
+        return False
+    return left < -OVERTIME_S or not any(a.pending for a in setup.assertions)
+
+
+def at_end(scene: Scene, snapshot: Snapshot) -> bool:
+    """Whether a freely driving ego has reached the end of its path."""
+    ego, path = snapshot.ego, scene.ego_path
+    return path.project(ego.x, ego.y).along >= path.length - ego.body.kind.length / 2
