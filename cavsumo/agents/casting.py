@@ -33,6 +33,7 @@ class CastMember:
         files: what it is made of: the file of a policy or of an object's class, and the files that
             its parameters name, as they were given.
         learns: whether its episodes change what it knows for the next.
+        searches: whether a searcher chooses what it plays.
         drives, promise, manoeuvre: as the agent declares them (``Agent``).
     """
 
@@ -41,6 +42,7 @@ class CastMember:
     params: Params
     files: tuple[Path, ...]
     learns: bool
+    searches: bool
     drives: bool
     promise: str
     manoeuvre: str
@@ -78,6 +80,11 @@ class Cast:
     def learners(self) -> frozenset[str]:
         """The labels of the agents that learn from episode to episode."""
         return frozenset(member.label for member in self.members if member.learns)
+
+    @property
+    def searchers(self) -> frozenset[str]:
+        """The labels of the agents for which a searcher chooses what they play."""
+        return frozenset(member.label for member in self.members if member.searches)
 
     @property
     def files(self) -> list[Path]:
@@ -154,6 +161,7 @@ def _member(
         present_params,
         files=(*files, *(Path(str(params[key])) for key in agent.FILES if key in params)),
         learns=agent.learns and plan.known is None,
+        searches=agent.searches and plan.known is None,
         drives=agent.drives,
         promise=agent.promise,
         manoeuvre=agent.manoeuvre,

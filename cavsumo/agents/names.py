@@ -22,6 +22,7 @@ AGENT_NAMES = Names(
         "random": "random",
         "recorded": "recorded",
         "scripted": "scripted",
+        "search": "searched",
         "timing": "programmed",
     },
     {
@@ -32,9 +33,13 @@ AGENT_NAMES = Names(
         "proximity": "distance_m idle manoeuvre",
         "q-learning": "alpha gamma epsilon half_life hold_s weights learn",
         "random": "rate_per_s epsilon between",
+        "search": "method",
         "timing": "aim idle manoeuvre",
     },
 )
+
+SEARCH = "search"  # the agent whose tests a searcher chooses, by one of these methods
+SEARCH_METHODS = ("portfolio", "random", "manoeuvres", "neighbours", "cma")
 
 PREFIX = "policy:"
 

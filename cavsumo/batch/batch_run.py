@@ -13,6 +13,7 @@ from cavsumo.batch.learning import Knowledge
 from cavsumo.batch.messages import Answer
 from cavsumo.batch.prepared import OUTPUTS, PreparedBatch
 from cavsumo.batch.progress import Progress
+from cavsumo.batch.searching import SearchFacts
 from cavsumo.batch.stopping import stopping_rule
 from cavsumo.batch.tally import Tally
 from cavsumo.egos.ego_files import OutputWatch
@@ -104,7 +105,9 @@ class BatchRun:
         A learning agent did not learn from such an episode: it starts anew, and its later rows
         change.
         """
-        todo, relearning = _to_retry(self.recorder.csv_file, self._knowledge.names)
+        todo, relearning = _to_retry(
+            self.recorder.csv_file, self._knowledge.names | self.prepared.cast.searchers
+        )
         known = self._knowledge.known()
         self._knowledge.forget(relearning)
         replaced: dict[int, Outcome] = {}
@@ -121,6 +124,11 @@ class BatchRun:
         self.recorder.replace(replaced)
         self.tally = Tally()
         self.tally.add_rows(rows_of(self.recorder.csv_file))
+
+    @property
+    def searches(self) -> dict[str, SearchFacts]:
+        """The findings of the searching agents."""
+        return {label: search.facts() for label, search in self._knowledge.searches.items()}
 
     def end(self) -> None:
         """Complete the manifest."""
@@ -145,6 +153,7 @@ class BatchRun:
             self.executor,
             todo,
             memories=self._knowledge.memories,
+            searches=self._knowledge.searches,
             ahead=LOOK_AHEAD * self.jobs,
             stopped=self.stopped,
         ):

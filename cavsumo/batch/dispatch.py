@@ -24,6 +24,7 @@ from typing import Any
 from cavsumo.batch.jobs import Job, Memory, failed, job
 from cavsumo.batch.messages import Answer
 from cavsumo.batch.prepared import PreparedBatch
+from cavsumo.batch.searching import Searching
 from cavsumo.batch.worker import play
 from cavsumo.errors import BatchError, CavsumoError
 
@@ -36,6 +37,7 @@ def run_batch(
     todo: Iterable[int],
     *,
     memories: Mapping[str, Memory] | None = None,
+    searches: Mapping[str, Searching] | None = None,
     ahead: int = 16,
     stopped: Callable[[], bool] = lambda: False,
 ) -> Iterator[Answer]:
@@ -47,11 +49,12 @@ def run_batch(
         executor: plays jobs by ``cavsumo.batch.worker.play``, in threads or in processes anywhere.
         todo: numbers of episodes, ascending.
         memories: the knowledge of learning agents, by name.
+        searches: the searches of searching agents, likewise; they are told of every episode.
         ahead: number of episodes that run or wait for their turn.
         stopped: called all the time; once true, running episodes are finished and no more are
             begun.
     """
-    line = _Line(prepared, executor, todo, dict(memories or {}))
+    line = _Line(prepared, executor, todo, dict(memories or {}), searches or {})
     try:
         while True:
             if stopped():
@@ -85,8 +88,10 @@ class _Line:
         executor: Executor,
         todo: Iterable[int],
         memories: dict[str, Any],
+        searches: Mapping[str, Searching],
     ) -> None:
         self.prepared, self.executor, self.memories = prepared, executor, memories
+        self.searches = searches
         agents = tuple(prepared.plan.cast)
         self._coming = (_Entry(run, agents[run % len(agents)]) for run in todo)
         self.entries: deque[_Entry] = deque()
@@ -102,7 +107,7 @@ class _Line:
                 if entry.agent in learning:
                     continue  # it can start when it has the memory of the episode before
                 learning.add(entry.agent)
-            if entry.future is None:
+            if entry.future is None and self._known(entry):
                 self._submit(entry)
 
     def advance(self) -> None:
@@ -114,6 +119,8 @@ class _Line:
                 entry.answer = self._answer(entry, entry.future)
                 if entry.agent in self._learners:
                     self.memories[entry.agent] = entry.answer.memory
+                if entry.agent in self.searches:
+                    self.searches[entry.agent].told(entry.answer.outcome.row)
 
     def ready(self) -> Iterator[Answer]:
         """The entries to return: all that are finished before the first that is not."""
@@ -132,9 +139,16 @@ class _Line:
                     self.entries.pop()
                 return
 
+    def _known(self, entry: _Entry) -> bool:
+        """Whether it is known what an entry is to play, for an agent that searches."""
+        search = self.searches.get(entry.agent)
+        return search is None or search.ready(entry.run)
+
     def _job(self, entry: _Entry) -> Job:
         """The job of an entry."""
-        return job(self.prepared.plan, entry.run, self.memories.get(entry.agent))
+        search = self.searches.get(entry.agent)
+        memory = search.memory(entry.run) if search else self.memories.get(entry.agent)
+        return job(self.prepared.plan, entry.run, memory)
 
     def _submit(self, entry: _Entry) -> None:
         """Hand an entry to the executor."""

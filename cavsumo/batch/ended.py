@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 
+from cavsumo.batch.searching import SearchFacts
 from cavsumo.batch.tally import Tally
 
 
@@ -20,6 +21,7 @@ class Ended:
         sequential: the number of episodes may depend on what they found, so the intervals must
             hold however it was decided to stop.
         cut_short: somebody stopped it.
+        searches: by agent, the findings of its search.
         promises: by agent, the class of egos for which its forecasts hold.
     """
 
@@ -30,6 +32,7 @@ class Ended:
     reference: str = "none"
     sequential: bool = False
     cut_short: bool = False
+    searches: Mapping[str, SearchFacts] = field(default_factory=dict)
     promises: Mapping[str, str] = field(default_factory=dict)
 
     @property

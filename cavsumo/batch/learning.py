@@ -12,6 +12,7 @@ from typing import Any
 
 from cavsumo.batch.dispatch import run_batch
 from cavsumo.batch.prepared import PreparedBatch
+from cavsumo.batch.searching import Searching
 from cavsumo.batch.tally import Row
 
 CHECKPOINT_EVERY = 20  # learning episodes between two records of the knowledge
@@ -24,6 +25,7 @@ class Knowledge:
         memories: by agent, its knowledge.
         after: by agent, the last episode from which it learned.
         owed: episodes with a recorded row from which the agents have not learned.
+        searches: by agent, its search.
     """
 
     def __init__(self, prepared: PreparedBatch, recorded: Mapping[str, Any]) -> None:
@@ -33,10 +35,13 @@ class Knowledge:
         self.after = {name: int(after.get(name, -1)) for name in self.names}
         self.owed: list[int] = []
         self._prepared, self._unnoted = prepared, 0
+        self.searches = {label: Searching(prepared, label) for label in prepared.cast.searchers}
 
     def seen(self, row: Row) -> None:
         """Take up a recorded row."""
         run, agent = int(row["run"]), row["agent"]
+        if agent in self.searches:
+            self.searches[agent].told(row)
         if agent in self.names and run > self.after[agent] and row["outcome"] != "error":
             self.owed.append(run)
 
@@ -71,6 +76,8 @@ class Knowledge:
         """Let agents start anew."""
         for name in names:
             self.memories.pop(name, None)
+            if name in self.searches:
+                self.searches[name] = Searching(self._prepared, name)
 
     def facts(self) -> dict[str, Any]:
         """The knowledge, for the manifest."""

@@ -93,6 +93,7 @@ def _play(
         prepared.plan.reference,
         sequential=looks_at_rows(prepared.plan),
         cut_short=batch_run.cut_short or batch_run.status == "interrupted",
+        searches=batch_run.searches,
         promises={member.label: member.promise for member in prepared.cast},
     )
 

@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from cavsumo.agents.casting import Cast, resolve_cast
+from cavsumo.agents.casting import Cast, resolve_cast, teams
 from cavsumo.agents.manoeuvres import types_for
 from cavsumo.assertions.specs import assertions_of
 from cavsumo.batch.plan_names import check_names
@@ -34,6 +34,7 @@ from cavsumo.network.traffic import Volume
 from cavsumo.network.traffic_lights import Pace
 from cavsumo.results.present import input_files
 from cavsumo.results.provenance import checksums, traffic_checksum, unequal, versions
+from cavsumo.search.space import space_of
 from cavsumo.suites.cases import case_plan, case_plans, suite_inputs
 from cavsumo.sumo.options import OPTIONS
 
@@ -157,6 +158,11 @@ def _prepared(plan: BatchPlan, ego: Ego | None) -> PreparedBatch:
             f"shard {plan.shard}: {' and '.join(sorted(cast.learners))} learns from episode to "
             "episode, in sequence; learn=false plays what was learned"
         )
+    if cast.searchers and plan.shard:
+        raise InputError(
+            f"shard {plan.shard}: {' and '.join(sorted(cast.searchers))} chooses each episode by "
+            "those before it, of which a shard has only a part"
+        )
     ego = ego or ego_of(scenario)
     if scenario.ego_sensor and type(ego).act is Ego.act:
         raise InputError(
@@ -218,6 +224,8 @@ def _site(plan: BatchPlan, kind: Kind, ego: Ego, cast: Cast) -> Site:
     if site.approaches:  # missing room must be found before the first episode
         kinds, rng = [kind] * scenario.testers, np.random.default_rng(plan.seed)
         site.draw(kinds, ego.kind, scenario.start_speed, rng)
+    if cast.searchers:
+        space_of(site, kind, teams(scenario))  # a space without a start is refused
     return site
 
 

@@ -12,6 +12,7 @@ from typing import Any, NamedTuple
 from cavsumo.batch.jobs import Job, Memory, job
 from cavsumo.batch.messages import Answer
 from cavsumo.batch.prepared import PreparedBatch, prepare
+from cavsumo.batch.searching import searched
 from cavsumo.batch.trust import check_trust
 from cavsumo.batch.worker import Worker
 from cavsumo.errors import DivergenceError, ResultsError, shown
@@ -171,14 +172,19 @@ def _played_again(worker: Worker, record: Record) -> Answer:
         worker.prepared.cast.check_memory(row["agent"], memory, source)
         again = Job(run, row["agent"], int(row["seed"]), memory, record=True)
         return worker.play(again)
-    return worker.play(dataclasses.replace(job(plan, run, known(worker, run)), record=True))
+    return worker.play(dataclasses.replace(job(plan, run, known(worker, record)), record=True))
 
 
-def known(worker: Worker, run: int) -> Memory | None:
-    """The knowledge of an episode's agents before it; a learner plays its earlier ones."""
-    plan, memory = worker.prepared.plan, job(worker.prepared.plan, run).memory
-    step = len(plan.agents)
-    learns = job(plan, run).agent in worker.prepared.cast.learners
+def known(worker: Worker, record: Record) -> Memory | None:
+    """The knowledge of an episode's agents before it.
+
+    A learner plays its earlier episodes; the point of a search follows from their rows.
+    """
+    plan, run = worker.prepared.plan, record.run
+    step, label, memory = len(plan.agents), record.row["agent"], job(plan, run).memory
+    if label in worker.prepared.cast.searchers:
+        return searched(worker.prepared, label, rows_of(record.file), run)
+    learns = label in worker.prepared.cast.learners
     for earlier in range(run % step, run, step) if learns else ():
         memory = worker.play(job(plan, earlier, memory)).memory
     return memory

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from cavsumo.batch.searching import SearchFacts
 from cavsumo.batch.tally import Found, Row
 from cavsumo.egos.reference import IDEAL, REFERENCES
 from cavsumo.results.failures import NOT_JUDGED, UNPREVENTABLE
 from cavsumo.results.rows import cell, is_failure
+from cavsumo.results.statistics import rate
 
 
 def many(count: int, what: str) -> str:
@@ -63,6 +65,25 @@ def exit_reason(found: Found, judged: bool) -> str:
     said = f"the ego violated an assertion, preventably in {many(found.preventable, 'episode')}"
     rest = found.failures - found.preventable
     return f"{said}, otherwise in {rest}" if rest else said
+
+
+def searched(found: SearchFacts) -> str:
+    """The findings of a search, or how much of the space it has seen without finding anything."""
+    whole = f"{many(found.episodes, 'episode')} and {found.seconds:.0f} simulated seconds"
+    if found.first is None:
+        bound = rate(0, found.uniform, "exact").high if found.uniform else None
+        said = f"no preventable failure in {whole}; {found.covered:.0%} of the cells of its space"
+        if bound is None:
+            return said
+        return (
+            f"{said}; of the {many(found.uniform, 'point')} drawn at random none failed, so at "
+            f"most {bound:.1%} of the space does (95 %)"
+        )
+    (episodes, seconds), failed = found.first, many(found.failures, "preventable failure")
+    return (
+        f"{failed}, {found.distinct} distinct, in {whole}; the "
+        f"first after {many(episodes, 'episode')} and {seconds:.0f} s; in common: {found.words}"
+    )
 
 
 def drive(found: Found) -> str:

@@ -48,6 +48,7 @@ def summarise(ended: Sequence[Ended], head: str = "") -> None:
     for one in ended:
         _say_forecasts(one, console)
         _say_failures(one, console)
+        _say_searches(one, console)
         _say_drive(one, console)
     _say_errors(ended, console)
     _say_bound(ended, console)
@@ -192,6 +193,12 @@ def _say_failures(one: Ended, console: Console) -> None:
     said = sentences.judgement(one.tally.all, one.reference) if one.judged else ""
     if said:
         _say(console, _of(one) + said)
+
+
+def _say_searches(one: Ended, console: Console) -> None:
+    """The findings of each search of a batch."""
+    for agent, found in one.searches.items():
+        _say(console, f"{_of(one)}{agent}: {sentences.searched(found)}")
 
 
 def _say_drive(one: Ended, console: Console) -> None:

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 from cavsumo.assertions.judgement import INVALID, VIOLATED, Judgement
 from cavsumo.model.scenario.script import ScriptedTest
 from cavsumo.results.column import Column, FinishedEpisode, Measured
+from cavsumo.results.grade import grade
 
 if TYPE_CHECKING:
     from cavsumo.agents.base import Forecast
@@ -366,6 +367,14 @@ _ALL = (
         "",
         _retried(lambda found: found.note),
         words=True,
+    ),
+    Column(
+        "grade",
+        "how near the episode came to a preventable failure: from 0 on its impact speed, below 0 "
+        "all others (docs/search.md)",
+        "",
+        lambda f: f.episode and grade(f.episode, f.avoidability),
+        since="0.2",
     ),
     Column(
         "cost",

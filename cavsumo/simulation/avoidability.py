@@ -54,6 +54,7 @@ class Avoidability:
         margin: how long before the violation that is [s].
         note: what kept it from being judged, or what to doubt, as a sentence.
         by_ideal: whether the ideal driver would have avoided it; None if not judged.
+        perceived: when the reference driver perceived the risk [s]; None if not judged.
     """
 
     avoidable: bool | None
@@ -61,6 +62,7 @@ class Avoidability:
     margin: float | None = None
     note: str = ""
     by_ideal: bool | None = None
+    perceived: float | None = None
 
 
 class NotJudged(CavsumoError):
@@ -138,14 +140,19 @@ class AvoidabilityCheck:
                 f"{MOST_RERUNS} reruns leave open whether a perception up to "
                 f"{frames[high - 1].time:.1f} s would have been early enough"
             )
-        note = "; ".join(notes)
         by_ideal = avoidable if type(ideal) is type(reference) else None
         if ideal is not None and by_ideal is None:
             by_ideal = self._first_avoided(ideal, avoided)
+        found = Avoidability(
+            avoidable,
+            note="; ".join(notes),
+            by_ideal=by_ideal,
+            perceived=frames[perceived].time,
+        )
         if low < 0:
-            return Avoidability(avoidable, note=note, by_ideal=by_ideal)
-        chance = frames[low].time
-        return Avoidability(avoidable, chance, frames[end].time - chance, note, by_ideal)
+            return found
+        last, margin = frames[low].time, frames[end].time - frames[low].time
+        return dataclasses.replace(found, last_chance=last, margin=margin)
 
     def _first_avoided(
         self, reference: Reference, avoided: Callable[[Reference, int], bool]

@@ -28,10 +28,10 @@ Joint = Sequence[Sequence[Action]]
 class Episode:
     """The record of an episode, during and after it.
 
-    Frames and actions only where they are kept; ``drives``: whether the ego steers itself;
-    ``forecast``: what the testers said of it beforehand; ``starts``: where they started, and
-    ``waited``: where they were while the ego entered; ``departures``: of the background, None
-    where they were not recorded or do not tell all of it.
+    ``seen``: all snapshots; frames and actions only where they are kept; ``drives``: whether the
+    ego steers itself; ``forecast``: what the testers said of it beforehand; ``starts``: where they
+    started, and ``waited``: where they were while the ego entered; ``departures``: of the
+    background, None where they were not recorded or do not tell all of it.
     """
 
     judgement: Judgement
@@ -53,6 +53,7 @@ class Episode:
     sumo_collisions: frozenset[tuple[str, str]] = frozenset()
     teleports: int = 0
     emergency_stops: int = 0
+    seen: list[Snapshot] = field(default_factory=list)
     frames: list[Snapshot] = field(default_factory=list)
     actions: list[Joint] = field(default_factory=list)
     starts: tuple[Start, ...] = ()

@@ -68,7 +68,7 @@ class EpisodeLoop:
         self._episode = Episode(Judgement(""), starts=begun.starts, waited=begun.waited)
         self._episode.forecast = _foretold(agents, self.agent_views)
         self._validity = ValidityMonitor(self.scene)
-        self.history: list[Snapshot] = []  # from which blame and progress are found
+        self.history: list[Snapshot] = self._episode.seen  # for blame, progress and grade
         self._chosen: list[Joint] = []
         self._keep(record or keep)
         self._arrived = False

@@ -151,16 +151,17 @@ def _word(plan: BatchPlan, label: str) -> str:
 def _known_before(record: Record) -> Memory | None:
     """The knowledge of an agent before an episode: from its trace, or by playing its earlier ones.
 
-    Agents that do not learn have none.
+    Agents that neither learn nor search have none.
     """
     plan, label = record.plan, record.row["agent"]
-    if label not in resolve_cast(plan).learners:
+    cast = resolve_cast(plan)
+    if label not in cast.learners | cast.searchers:
         return (plan.known or {}).get(label)
     if record.trace is not None and record.trace.head.get("memory_kept"):
         memory = record.trace.head["memory"]
         return None if memory is None else tuple(memory)
     with Worker(prepared_again(record)) as worker:
-        return known(worker, record.run)
+        return known(worker, record)
 
 
 def _trace(record: Record) -> Trace:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -11,6 +11,7 @@ from cavsumo.cli.options.values import values_of
 
 if TYPE_CHECKING:
     from cavsumo.model.scenario.fields import Setting
+    from cavsumo.model.study import Part
 
 SCRATCH = "results.csv"  # where the results of a run without -o lie
 
@@ -24,11 +25,11 @@ def add_run(commands: Any) -> None:
         "default; a TOML file given with -c may hold the same keys, the command line wins.",
         allow_abbrev=False,
     )
-    run.fill = _fill
+    run.fill = fill
     run.set_defaults(command=_run)
 
 
-def _fill(run: argparse.ArgumentParser) -> None:
+def fill(run: argparse.ArgumentParser) -> None:
     """Add the options, a group for each heading of the settings."""
     from cavsumo.cli.setting_options import add_setting
     from cavsumo.model.scenario.fields import settings
@@ -83,13 +84,19 @@ OTHERS: Mapping[str, Callable[[Callable[..., Any]], None]] = {
 
 
 def _run(options: argparse.Namespace) -> int:
+    from cavsumo.cli.scenario_settings import parts_of
+
+    return played(parts_of(options), options)
+
+
+def played(parts: Sequence[Part], options: argparse.Namespace) -> int:
+    """Play the batches of a run as its options say."""
     from cavsumo.batch.manner import Manner, Means
     from cavsumo.batch.planned import planned
-    from cavsumo.cli.scenario_settings import parts_of
 
     manner = Manner(**values_of(options, Manner), scratch=options.output is None)
     means = Means(options.jobs, options.executor, options.scheduler)
-    batches = planned(parts_of(options), Path(options.output or SCRATCH), manner)
+    batches = planned(parts, Path(options.output or SCRATCH), manner)
     # What can be refused quickly has been; now comes what takes long to import.
     from cavsumo.cli.commands.run import run_study
 

@@ -1,0 +1,61 @@
+"""The agent whose tests are searched for: it plays the point of a space that a searcher chose.
+
+The searcher works in the parent process (``batch.searching``) and sends starts and programmes as
+what the agent remembers, so an episode is replayed without it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any, ClassVar
+
+import numpy as np
+
+from cavsumo.agents.base import AGENTS, Agent
+from cavsumo.agents.names import SEARCH, SEARCH_METHODS
+from cavsumo.agents.programme import ProgrammedWalk, WalkProgramme
+from cavsumo.agents.recorded import start_of
+from cavsumo.model.bodies import Action
+from cavsumo.model.checks import choice
+from cavsumo.model.scene import Scene
+from cavsumo.model.snapshot import Snapshot
+
+
+@AGENTS.register(SEARCH)
+class SearchAgent(Agent):
+    """Searches for preventable failures: every episode is a point of a space of tests."""
+
+    PARAMETERS: ClassVar[Mapping[str, str]] = {
+        "method": f"how points are chosen: {', '.join(SEARCH_METHODS)} (docs/search.md)",
+    }
+    sees_background = False
+    drives = False
+    searches = True
+
+    def __init__(self, method: str = "portfolio") -> None:
+        self.method = choice("method", method, SEARCH_METHODS)
+        self._programmes: list[WalkProgramme | None] = []
+
+    def reset(self, scene: Scene, owned: Sequence[int], rng: np.random.Generator) -> None:
+        super().reset(scene, owned, rng)
+        programmes = self._programmes or [None] * len(owned)
+        self._walks = [
+            ProgrammedWalk(scene, i, programme)
+            for i, programme in zip(owned, programmes, strict=True)
+        ]
+
+    def choose_action(self, snapshot: Snapshot) -> tuple[Action, ...]:
+        return tuple(
+            walk.action(snapshot, state)
+            for walk, state in zip(self._walks, self.own(snapshot), strict=True)
+        )
+
+    def recall(self) -> Any:
+        return {
+            "starts": self.recorded_starts,
+            "programmes": [one and list(one) for one in self._programmes],
+        }
+
+    def remember(self, memory: Mapping[str, Any]) -> None:
+        self.recorded_starts = [start_of(start) for start in memory["starts"]]
+        self._programmes = [one and WalkProgramme(*one) for one in memory["programmes"]]

@@ -1,0 +1,56 @@
+"""CMA-ES with restarts (the package ``cma``)."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from cavsumo.search.searchers import GENERATION, PlayedPoint
+from cavsumo.search.space import Point, Space
+
+SIGMA = 0.22
+STALE = 10  # generations without progress before a restart
+PROGRESS = 0.01
+
+
+class EvolutionSearch:
+    """Covariance matrix adaptation from a random point, again and again."""
+
+    uniform = False
+
+    def __init__(self, space: Space, rng: np.random.Generator) -> None:
+        self.space, self.rng = space, rng
+        self._best, self._stale = -np.inf, 0
+        self._begin()
+
+    def ask(self) -> list[Point]:
+        if self._stale >= STALE or self._strategy.stop():
+            self._begin()
+        self._asked = self._strategy.ask()
+        return [np.clip(np.asarray(x, dtype=float), 0.0, 1.0) for x in self._asked]
+
+    def tell(self, points: Sequence[Point], told: Sequence[PlayedPoint]) -> None:
+        grades = [t.grade for t in told]
+        self._strategy.tell(self._asked, [-g for g in grades])
+        better = max(grades) > self._best + PROGRESS
+        self._best = max(self._best, *grades)
+        self._stale = 0 if better else self._stale + 1
+
+    def _begin(self) -> None:
+        """Begin at another point."""
+        import cma  # takes 0.3 s
+
+        x0 = self.rng.random(self.space.dimension)
+        options: dict[str, Any] = {
+            "bounds": [0.0, 1.0],
+            "popsize": GENERATION,
+            "seed": np.nan,  # the numbers come from ``randn`` alone
+            "randn": lambda *shape: self.rng.standard_normal(shape),
+            "verbose": -9,
+            "verb_disp": 0,
+            "verb_log": 0,
+        }
+        self._strategy = cma.CMAEvolutionStrategy(np.clip(x0, 0.02, 0.98), SIGMA, options)
+        self._best, self._stale = -np.inf, 0

@@ -1,0 +1,63 @@
+"""A portfolio: searchers share the budget by what each finds."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from cavsumo.search.evolution import EvolutionSearch
+from cavsumo.search.manoeuvres import ManoeuvreSearch
+from cavsumo.search.neighbours import NeighbourSearch
+from cavsumo.search.searchers import PlayedPoint, RandomSearch, Searcher
+from cavsumo.search.space import Point, Space
+
+FIRST = 3  # generations of known manoeuvres before the others take part
+FORGET = 0.8  # weight of what an earlier generation found
+
+
+class Portfolio:
+    """Known manoeuvres first; then each generation goes to the searcher that has found most."""
+
+    def __init__(self, space: Space, rng: np.random.Generator) -> None:
+        self.rng = rng
+        streams = iter(rng.spawn(4))
+        known = ManoeuvreSearch(space, next(streams))
+        self.members: dict[str, Searcher] = {
+            "manoeuvres": known,
+            "neighbours": NeighbourSearch(space, next(streams), known),
+            "cma": EvolutionSearch(space, next(streams)),
+            "random": RandomSearch(space, next(streams)),
+        }
+        self._worth = dict.fromkeys(self.members, 1.0)
+        self._generation = 0
+        self._turn = "manoeuvres"
+        self._kinds: set[tuple[object, ...]] = set()
+
+    @property
+    def uniform(self) -> bool:
+        """Whether the last generation was one of random points."""
+        return self.members[self._turn].uniform
+
+    def ask(self) -> list[Point]:
+        self._turn = self._chosen()
+        return self.members[self._turn].ask()
+
+    def tell(self, points: Sequence[Point], told: Sequence[PlayedPoint]) -> None:
+        self._generation += 1
+        for name, member in self.members.items():
+            if name in (self._turn, "neighbours"):
+                member.tell(points, told)
+        fresh = {t.kind for t in told if t.failed} - self._kinds
+        self._kinds |= fresh
+        gained = len(fresh) + 0.3 * sum(t.failed for t in told)
+        self._worth[self._turn] = FORGET * self._worth[self._turn] + gained
+
+    def _chosen(self) -> str:
+        """The searcher of the next generation: by chance, in proportion to its worth."""
+        if self._generation < FIRST:
+            return "manoeuvres"
+        names = list(self.members)
+        base = {"manoeuvres": 1.0, "neighbours": 2.0, "cma": 0.3, "random": 0.3}
+        weights = np.array([base[n] * (0.3 + self._worth[n]) for n in names])
+        return names[int(self.rng.choice(len(names), p=weights / weights.sum()))]

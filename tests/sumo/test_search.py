@@ -1,0 +1,123 @@
+"""The command search with real SUMO: the same rows however it is played, and replays."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+from support import rows, traces
+
+from cavsumo.cli import main
+from cavsumo.errors import Exit, NetworkError
+from cavsumo.model.bodies import PEDESTRIAN
+from cavsumo.model.scenario import BatchPlan
+from cavsumo.network.site import Site
+from cavsumo.search.space import space_of
+
+Capture = pytest.CaptureFixture[str]
+RUNS = 24
+
+
+def _search(file: Path, *more: str, runs: int = RUNS) -> int:
+    words = ["search", "--net", "pedestrians", "--ego", "constant", "--runs", str(runs), "-q"]
+    return main([*words, "-o", str(file), *more])
+
+
+def _folder(folder: Path) -> Path:
+    """A results file of the same name in a folder of its own, as traces are named by it."""
+    folder.mkdir()
+    return folder / "found.csv"
+
+
+@pytest.fixture(scope="module")
+def found(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A search whose ego never brakes."""
+    file = tmp_path_factory.mktemp("search") / "found.csv"
+    assert _search(file) == Exit.VIOLATED
+    return file
+
+
+def test_rows_do_not_depend_on_how_it_is_played(found: Path, tmp_path: Path) -> None:
+    """Two at a time; and stopped in the middle of a generation and continued."""
+    both, parts = (_folder(tmp_path / name) for name in ("both", "parts"))
+    assert _search(both, "-j", "2") == Exit.VIOLATED
+    assert rows(both) == rows(found)
+    assert traces(both) == traces(found)
+    _search(parts)
+    kept = parts.read_bytes().splitlines(keepends=True)[: 1 + 13]
+    parts.write_bytes(b"".join(kept))
+    assert _search(parts, "--resume", "-j", "2") == Exit.VIOLATED
+    assert rows(parts) == rows(found)
+
+
+def test_a_search_finds_preventable_failures(found: Path) -> None:
+    """Every grade stands in its row, from 0 on for preventable failures alone."""
+    played = rows(found)
+    failed = [row for row in played if row["outcome"] == "violated" and row["avoidable"] == "1"]
+    assert failed
+    assert [row for row in played if float(row["grade"]) >= 0.0] == failed
+    for row in failed:
+        assert float(row["grade"]) == pytest.approx(float(row["impact_speed_mps"]), abs=2e-3)
+
+
+def test_a_point_is_replayed_from_its_trace_and_from_the_rows(
+    found: Path, tmp_path: Path, capsys: Capture
+) -> None:
+    """Without traces the rows before it tell the searcher what to ask for."""
+    run = next(row["run"] for row in rows(found)[11:] if row["outcome"] == "violated")
+    assert main(["replay", str(found), run]) == 0
+    assert "the same" in capsys.readouterr().out
+    bare = tmp_path / "bare.csv"
+    assert _search(bare, "--trace", "none") == Exit.VIOLATED
+    assert main(["replay", str(bare), run]) == 0
+    assert "the same" in capsys.readouterr().out
+
+
+def test_the_summary_names_common_features(tmp_path: Path, capsys: Capture) -> None:
+    """How many failures, how many kinds, when the first came; with none, what was seen."""
+    words = ["search", "--net", "pedestrians", "--runs", "10", "--method", "random"]
+    out = ["-o", str(tmp_path / "a.csv")]
+    assert main([*words, *out, "--ego", "constant", "--exit-zero"]) == 0
+    said = capsys.readouterr().out
+    assert "distinct, in 10 episodes and" in said
+    assert "the first after" in said
+    assert "in common: from " in said
+    assert main([*words, "-o", str(tmp_path / "b.csv"), "--ego", "time-gap", "--exit-zero"]) == 0
+    said = capsys.readouterr().out
+    assert "search: no preventable failure in 10 episodes" in said
+    assert "of the 10 points drawn at random none failed, so at most 30.8% of the space" in said
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (["--method", "cmaes"], "argument --method: invalid choice: 'cmaes'"),
+        (["--kind", "car"], "agent search can only walk"),
+        (["--shard", "1/2"], "shard 1/2: search"),
+    ],
+)
+def test_a_search_that_is_impossible_is_refused(
+    words: list[str], said: str, tmp_path: Path, capsys: Capture
+) -> None:
+    """One sentence, and nothing is written."""
+    file = tmp_path / "no.csv"
+    assert _search(file, *words) == Exit.USAGE
+    assert said in capsys.readouterr().err
+    assert not list(tmp_path.iterdir())
+
+
+def test_another_space_is_not_continued(found: Path, capsys: Capture) -> None:
+    """Two testers have other points than one."""
+    assert _search(found, "--resume", "--testers", "2") == Exit.USAGE
+    assert "testers" in capsys.readouterr().err
+
+
+def test_a_route_that_nobody_can_meet_is_refused(
+    staged: Callable[..., tuple[BatchPlan, Site]],
+) -> None:
+    """The sentence names the network and the way out."""
+    _, site = staged("pedestrians")
+    with pytest.raises(NetworkError, match="a search finds no place for a pedestrian"):
+        space_of(dataclasses.replace(site, areas=()), PEDESTRIAN, ((0,),))
