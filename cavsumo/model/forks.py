@@ -73,9 +73,7 @@ class Fork(Generic[Result]):
     ) -> None:
         self._deadline, self.ends = deadline, time.monotonic() + deadline
         self._received = bytearray()
-        self.source, sink = (
-            os.pipe()
-        )  # before the others are listed: it takes none of their numbers
+        self.source, sink = os.pipe()  # before the listing, so that it takes no number of it
         open_now, follow_parent = places(), end_with_parent(os.getpid())
         for kept in (sink, *keep):
             open_now.pop(kept, None)
