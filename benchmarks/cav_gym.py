@@ -26,7 +26,7 @@ from cavsumo.batch.executors import local_executor
 from cavsumo.batch.jobs import job
 from cavsumo.batch.prepared import PreparedBatch, prepare
 from cavsumo.batch.summary import interval, percent
-from cavsumo.batch.tally import tallied
+from cavsumo.batch.tally import Tally
 from cavsumo.model.bodies import PEDESTRIAN, Body
 from cavsumo.model.carriageway import Start
 from cavsumo.model.geometry import Box, overlap
@@ -37,7 +37,7 @@ from cavsumo.model.stopping_zones import zone_entered
 from cavsumo.network.pedestrian_starts import draw_starts
 from cavsumo.network.site import Site
 from cavsumo.results.rows import is_test
-from cavsumo.results.statistics import rate
+from cavsumo.results.statistics import Rate, rate
 
 ROOT = Path(__file__).resolve().parent.parent
 SETTINGS = {
@@ -74,7 +74,7 @@ def compare(runs: int) -> None:
         rows = play(testers, AGENTS, runs)
         for agent in AGENTS:
             mine = [r for r in rows if r["agent"] == agent]
-            found = tallied(mine).rate("tests")
+            found = rate_of_tests(mine)
             unfair = sum(r["outcome"] == "unfair" for r in mine)
             theirs, low, high = measured[THEIRS.get(agent, agent), testers]
             print(
@@ -106,7 +106,7 @@ def force(runs: int) -> None:
         made = prepared(testers, ("timing",), count)
         possible = [forceable_episode(made.plan, made.site, run) for run in range(count)]
         rows = play(testers, ("timing",), count)
-        found, bound = tallied(rows).rate("tests"), rate(sum(possible), count)
+        found, bound = rate_of_tests(rows), rate(sum(possible), count)
         unfair = sum(r["outcome"] == "unfair" for r in rows)
         won = sum(p and is_test(r) for r, p in zip(rows, possible, strict=True))
         print(
@@ -131,6 +131,13 @@ def play(testers: int, agents: tuple[str, ...], runs: int) -> list[dict[str, obj
     made = prepared(testers, agents, runs)
     with local_executor(2) as executor:
         return [answer.outcome.row for answer in run_batch(made, executor, made.plan.todo())]
+
+
+def rate_of_tests(rows: list[dict[str, object]]) -> Rate:
+    """The tests among valid episodes."""
+    tally = Tally()
+    tally.add_rows(rows)
+    return tally.all.rate("tests")
 
 
 def forceable_episode(plan: BatchPlan, site: Site, run: int) -> bool:

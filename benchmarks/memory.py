@@ -35,11 +35,10 @@ NET = Path(__file__).resolve().parent.parent / "networks" / "pedestrians.net.xml
 class Stubs(Executor):
     """Plays nothing: every episode is a test at once."""
 
-    def submit(self, _: Any, prepared: Any, jobs: Any) -> Future[Any]:  # type: ignore[override]
+    def submit(self, _: Any, prepared: Any, job: Any) -> Future[Any]:  # type: ignore[override]
         future: Future[Any] = Future()
-        made = {"outcome": "held", "trigger_time_s": 1.0 + jobs[0].run % 97 / 10, "wall_s": 0.0}
-        rows = [row_of(finished(prepared.plan, job)) | made for job in jobs]
-        future.set_result([Answer(Outcome(row)) for row in rows])
+        made = {"outcome": "held", "trigger_time_s": 1.0 + job.run % 97 / 10, "wall_s": 0.0}
+        future.set_result(Answer(Outcome(row_of(finished(prepared.plan, job)) | made)))
         return future
 
 

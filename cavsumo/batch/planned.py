@@ -13,8 +13,8 @@ from typing import Any
 from cavsumo.batch.manner import Manner
 from cavsumo.batch.plan_names import check_names
 from cavsumo.errors import InputError, ResultsError
+from cavsumo.model.gone_settings import without_gone
 from cavsumo.model.scenario import BatchPlan, plan_from
-from cavsumo.model.scenario.gone import without_gone
 from cavsumo.model.study import Part
 from cavsumo.network.network_file import root_of
 from cavsumo.results.present import gone, present_paths

@@ -7,7 +7,7 @@ from collections.abc import Callable, Collection, Sequence
 from typing import Any, NoReturn
 
 from cavsumo.errors import InputError, UnknownName
-from cavsumo.model.scenario.gone import GONE
+from cavsumo.model.gone_settings import GONE
 
 
 class OptionParser(argparse.ArgumentParser):

@@ -49,16 +49,25 @@ def stand_alone(places: Mapping[int, int | None], deadline: float) -> None:
     signal.signal(signal.SIGALRM, signal.SIG_DFL)
     signal.signal(signal.SIGTERM, signal.SIG_DFL)
     signal.setitimer(signal.ITIMER_REAL, deadline + ALARM_AFTER_S)
+    # A file that nothing refers to may have been closed since it was listed.
+    here = {number: place for number, place in places.items() if _is_open(number)}
     nowhere = os.open(os.devnull, os.O_RDWR)
-    for number, place in places.items():
+    for number, place in here.items():
         own = nowhere if place is None else _opened_again(number)
-        if own == number:  # it has been closed since it was listed
-            continue
         if place is not None:
             os.lseek(own, place, os.SEEK_SET)
         os.dup2(own, number, inheritable=False)
         if place is not None:
             os.close(own)
+
+
+def _is_open(number: int) -> bool:
+    """Whether there is such a descriptor."""
+    try:
+        os.fstat(number)
+    except OSError:
+        return False
+    return True
 
 
 def _opened_again(number: int) -> int:

@@ -73,12 +73,12 @@ class Fork(Generic[Result]):
     ) -> None:
         self._deadline, self.ends = deadline, time.monotonic() + deadline
         self._received = bytearray()
+        self.source, sink = os.pipe()  # before the listing, so that it takes no number of it
         open_now, follow_parent = places(), end_with_parent(os.getpid())
-        for kept in keep:
+        for kept in (sink, *keep):
             open_now.pop(kept, None)
         drawn = random.getstate()  # Python seeds it anew in a fork
         flush()
-        self.source, sink = os.pipe()
         try:
             self._pid = os.fork()
         except OSError as error:

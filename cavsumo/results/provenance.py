@@ -13,8 +13,8 @@ from cavsumo import __version__
 from cavsumo.assertions.specs import assertion_files
 from cavsumo.egos.specs import ego_files
 from cavsumo.model.checksums import checksum
+from cavsumo.model.gone_settings import without_gone
 from cavsumo.model.scenario import Scenario
-from cavsumo.model.scenario.gone import without_gone
 from cavsumo.network.site import Site
 
 # Settings that determine how much of a batch is played, not its episodes.

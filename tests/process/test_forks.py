@@ -18,7 +18,8 @@ import pytest
 from support import alive, until
 
 from cavsumo.errors import BranchError, SimulationError
-from cavsumo.model.fork_child import stand_alone
+from cavsumo.model import forks
+from cavsumo.model.fork_child import places, stand_alone
 from cavsumo.model.forks import can_fork, forked
 from cavsumo.model.offspring import descendants
 
@@ -188,6 +189,26 @@ def test_what_a_child_writes_reaches_nobody(tmp_path: Path) -> None:
         os.write(sink, b"parent")
         assert os.read(source, 99) == b"parent"
         assert file.read_text() == "parent"
+    finally:
+        os.close(source)
+        os.close(sink)
+
+
+def test_a_file_may_be_closed_after_it_was_listed(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Nothing refers to it any more; its number belongs to who opens something next."""
+    file = tmp_path / "garbage"
+    file.touch()
+
+    def listed() -> dict[int, int | None]:
+        with file.open(), file.open():
+            return places()
+
+    monkeypatch.setattr(forks, "places", listed)
+    source, sink = os.pipe()
+    try:
+        assert outcomes(lambda: os.write(sink, b"child")) == [5]
     finally:
         os.close(source)
         os.close(sink)

@@ -323,6 +323,8 @@ def test_a_folder_that_is_gone_is_one_sentence(prepared: PreparedBatch, tmp_path
 
 # Idling -------------------------------------------------------------------------------------------
 
+LOG = 2  # the descriptor to which SUMO would print
+
 
 def test_a_process_with_nothing_to_do_says_goodbye(
     prepared: PreparedBatch, monkeypatch: pytest.MonkeyPatch
@@ -330,7 +332,7 @@ def test_a_process_with_nothing_to_do_says_goodbye(
     """It goes by itself after a while, so that dask workers and open sessions hold no SUMO."""
     monkeypatch.setattr(worker_process, "IDLE_S", 0.2)
     ours, theirs = Pipe()
-    serving = threading.Thread(target=worker_process._serve, args=(theirs, Task(prepared)))
+    serving = threading.Thread(target=worker_process._serve, args=(theirs, Task(prepared), LOG))
     serving.start()
     try:
         assert ours.poll(PATIENCE_S)
@@ -353,7 +355,7 @@ def test_a_refusal_of_the_system_is_in_words(
 
     monkeypatch.setattr(PreparedBatch, "check_here", full)
     ours, theirs = Pipe()
-    worker_process._serve(theirs, Task(prepared))
+    worker_process._serve(theirs, Task(prepared), LOG)
     assert ours.recv() == Reply("refused", "'types.add.xml': No space left on device")
 
 

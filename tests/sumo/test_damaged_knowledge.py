@@ -12,6 +12,7 @@ import pytest
 from support import content
 
 from cavsumo.cli import main
+from cavsumo.results.trace_file import PACKED, PLAIN, packed, read_trace_text
 
 Q, BEST = 2, 5  # the last runs of the two learners
 QUIET = ("-q", "--exit-zero")
@@ -37,21 +38,25 @@ def learned(
 def damaged(
     learned: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> Callable[[str, Any, tuple[Any, ...]], None]:
-    """Call with a file, a value and where to put it: the files, that one changed."""
+    """Call with a file, a value and where to put it: the files, that one changed.
+
+    A trace is written as its name says, compressed or as plain text.
+    """
     folder = tmp_path / "here"
     shutil.copytree(learned, folder)
     monkeypatch.chdir(folder)
 
     def change(name: str, value: Any, place: tuple[Any, ...]) -> None:
-        first, feed, rest = Path(name).read_text("utf-8").partition("\n")
-        whole = name.endswith(".json")
+        file, whole = Path(name), name.endswith(".json")
+        found = file if file.exists() else file.with_name(f"{file.name}.gz")
+        first, feed, rest = read_trace_text(found).partition("\n")
         document = at = json.loads(first + feed + rest if whole else first)
         *ways, last = place
         for key in ways:
             at = at[key]
         at[last] = value
-        text = json.dumps(document)
-        Path(name).write_text(text if whole else f"{text}\n{rest}", "utf-8")
+        text = json.dumps(document) + ("" if whole else f"\n{rest}")
+        file.write_bytes(packed(text) if name.endswith(".gz") else text.encode())
 
     return change
 
@@ -79,19 +84,21 @@ def test_a_damaged_memory_of_a_trace_is_refused(
 ) -> None:
     """The file and the key are named."""
     agent = "q-learning" if run == Q else "best-response"
-    trace = f"found/run{run:06d}.jsonl"
+    trace = f"found/run{run:06d}{PACKED}"
     damaged(trace, value, ("memory", *place))
     assert main(["replay", trace]) == 2
     said = capsys.readouterr().err
     assert said == f"cavsumo: trace {trace!r}: memory: is not what agent {agent} can have known\n"
 
 
+@pytest.mark.parametrize("ending", [PLAIN, PACKED])
 def test_knowledge_of_another_number_of_agents_is_refused(
-    damaged: Callable[..., None], capsys: pytest.CaptureFixture[str]
+    damaged: Callable[..., None], capsys: pytest.CaptureFixture[str], ending: str
 ) -> None:
-    """Two agents have one body each."""
-    damaged(f"found/run{Q:06d}.jsonl", [], ("memory",))
-    assert main(["replay", f"found/run{Q:06d}.jsonl"]) == 2
+    """Two agents have one body each; in a trace of either sort."""
+    trace = f"found/run{Q:06d}{ending}"
+    damaged(trace, [], ("memory",))
+    assert main(["replay", trace]) == 2
     assert "memory: is not what agent q-learning can have known" in capsys.readouterr().err
 
 
@@ -139,7 +146,7 @@ def test_numbers_of_a_trace_that_lead_nowhere_are_refused(
     said: str,
 ) -> None:
     """Before anything is simulated."""
-    trace = f"found/run{Q:06d}.jsonl"
+    trace = f"found/run{Q:06d}{PACKED}"
     damaged(trace, value, place)
     assert main(["replay", trace, "--playback"]) == 2
     assert said in capsys.readouterr().err

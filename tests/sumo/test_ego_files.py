@@ -133,7 +133,9 @@ def test_a_file_is_read_again_only_when_it_was_touched(
 ) -> None:
     """Weights of a gigabyte are not read after every episode."""
     read: list[Path] = []
-    monkeypatch.setattr("cavsumo.egos.ego_files.checksum", lambda file: str(read.append(file)))
+    monkeypatch.setattr(
+        "cavsumo.egos.ego_files.readable_checksum", lambda file: str(read.append(file))
+    )
     watch = OutputWatch("exec:my-stack gain.txt", {"gain.txt": "None"})
     assert [watch.outputs(), watch.outputs()] == [[], []]
     assert len(read) == 1

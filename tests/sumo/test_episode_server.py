@@ -66,6 +66,8 @@ def serve(set_up: Callable[..., PreparedBatch], monkeypatch: Patch) -> Serve:
         name: str = "pedestrians", deadline: float = 60.0, large: int = 0, **settings: Any
     ) -> Iterator[Served]:
         monkeypatch.setattr(episode_server, "LARGE", large)
+        idle = threading.active_count()  # those of other tests' workers hold nothing
+        monkeypatch.setattr(episode_server, "can_fork", lambda: threading.active_count() == idle)
         with tempfile.TemporaryFile() as log, EpisodeRunner(set_up(name, **settings)) as runner:
             runner.try_out()
             yield Served(runner, deadline, log.fileno())

@@ -24,7 +24,7 @@ from cavsumo.batch.certify.used_seeds import used
 from cavsumo.batch.prepared import PreparedBatch
 from cavsumo.cli import main
 from cavsumo.results.reading import FIRST, read_manifest
-from cavsumo.results.trace_file import read_trace_text
+from cavsumo.results.trace_file import packed, read_trace_text
 
 RUN = 1  # which the ego fails
 PLAYED = ("run", "--net", "networks/crossing.net.xml", "--runs", "2", "--trace", "all")
@@ -80,11 +80,10 @@ def closed(moved: Path, elsewhere: Path, monkeypatch: pytest.MonkeyPatch) -> Pat
     """The results, of files that lay in a folder which is closed to this user."""
     folder = elsewhere / "theirs"
     for file in (_copied(moved, elsewhere), *map(partial(_copied, moved, elsewhere), PARTS)):
-        for text in (file.with_suffix(".json"), *file.with_suffix("").glob("run*.jsonl")):
-            found = text.read_text("utf-8")
-            for sort in ("networks", "routes"):
-                found = found.replace(f'"{sort}/crossing.', f'"{folder}/{sort}/crossing.')
-            text.write_text(found, "utf-8")
+        own = file.with_suffix(".json")
+        own.write_text(_moved_to(folder, own.read_text("utf-8")), "utf-8")
+        for trace in file.with_suffix("").glob("run*.jsonl.gz"):
+            trace.write_bytes(packed(_moved_to(folder, read_trace_text(trace))))
     stat = os.stat
 
     def refused(path: Any, *args: Any, **how: Any) -> os.stat_result:
@@ -100,7 +99,7 @@ def closed(moved: Path, elsewhere: Path, monkeypatch: pytest.MonkeyPatch) -> Pat
     "words",
     [
         "replay results.csv 1",
-        "replay results/run000001.jsonl --playback",
+        "replay results/run000001.jsonl.gz --playback",
         "replay results.csv 1 --recorded --html page.html",
         "report results.csv --html report.html -o t.txt",
         "certify results.csv 1 --runs 1 -q --exit-zero",
@@ -398,6 +397,14 @@ def _copied(moved: Path, folder: Path, stem: str = "results") -> Path:
         shutil.copy(moved / f"{stem}{end}", folder)
     shutil.copytree(moved / stem, folder / stem)
     return folder / f"{stem}.csv"
+
+
+def _moved_to(folder: Path, text: str) -> str:
+    """A manifest or a trace whose network and routes lay in a folder."""
+    for sort in ("networks", "routes"):
+        assert f'"{sort}/crossing.' in text
+        text = text.replace(f'"{sort}/crossing.', f'"{folder}/{sort}/crossing.')
+    return text
 
 
 def _inputs(file: Path) -> dict[str, bytes]:

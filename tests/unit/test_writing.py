@@ -407,11 +407,11 @@ def test_a_run_whose_results_are_removed_ends_with_one_sentence(
 
     class Meddler(Executor):
         def submit(self, fn: Any, /, *args: Any, **kwargs: Any) -> Future[Any]:
-            _, jobs = args
-            if jobs[0].run == 2:
+            _, job = args
+            if job.run == 2:
                 file.unlink()
             future: Future[Any] = Future()
-            future.set_result([Answer(outcome(job.run), None) for job in jobs])
+            future.set_result(Answer(outcome(job.run), None))
             return future
 
     with Recorder(file) as recorder:

@@ -10,9 +10,9 @@ from pydantic import ValidationError
 
 from cavsumo.errors import InputError, UnknownName, plain, shown
 from cavsumo.model.documents import first_problem
+from cavsumo.model.gone_settings import GONE
 from cavsumo.model.named_networks import check_network, is_named, named_routes, routes_of
 from cavsumo.model.scenario.fields import settings as offered
-from cavsumo.model.scenario.gone import GONE
 from cavsumo.model.scenario.plan import BatchPlan
 from cavsumo.model.scenario.record import Scenario
 from cavsumo.model.scenario.sensor import Sensor

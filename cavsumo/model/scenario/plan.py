@@ -8,8 +8,8 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationInfo, field_validator, model_validator
 
+from cavsumo.model.gone_settings import GONE, without_gone
 from cavsumo.model.labels import cast_of
-from cavsumo.model.scenario.gone import GONE, without_gone
 from cavsumo.model.scenario.option import Option
 from cavsumo.model.scenario.params import Params, qualified
 from cavsumo.model.scenario.record import Scenario
