@@ -28,6 +28,7 @@ from cavsumo.model.cache import keep, keep_newest, kept
 from cavsumo.model.carriageway import Approach, Light, Limit, MarkedCrossing, Roads
 from cavsumo.model.checksums import checksum
 from cavsumo.model.polyline import Path as Polyline
+from cavsumo.model.surroundings import LaneBorders, RouteLane, Surroundings
 from cavsumo.network.ego_routes import EgoRoute
 from cavsumo.network.pedestrian_starts import StartingArea
 from cavsumo.network.site import Site, Wishes, derive_site
@@ -39,6 +40,7 @@ LIBRARIES = ("numpy", "shapely", "sumolib")
 RECORDS = (
     *(Site, EgoRoute, Polyline, StartingArea, LightStart, type(Path())),
     *(Approach, Light, Limit, MarkedCrossing, Roads),
+    *(Surroundings, RouteLane, LaneBorders),
 )
 MADE: dict[tuple[str, str], Any] = {
     (one.__module__, one.__qualname__): one for one in (*RECORDS, shapely.from_wkb)

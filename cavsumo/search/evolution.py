@@ -23,11 +23,12 @@ class EvolutionSearch:
     def __init__(self, space: Space, rng: np.random.Generator) -> None:
         self.space, self.rng = space, rng
         self._best, self._stale = -np.inf, 0
-        self._begin()
+        self._strategy: Any = None  # not begun: the package takes a second to import
 
     def ask(self) -> list[Point]:
-        if self._stale >= STALE or self._strategy.stop():
-            self._begin()
+        if self._strategy is None or self._stale >= STALE or self._strategy.stop():
+            self._strategy = self._begun()
+            self._best, self._stale = -np.inf, 0
         self._asked = self._strategy.ask()
         return [np.clip(np.asarray(x, dtype=float), 0.0, 1.0) for x in self._asked]
 
@@ -38,11 +39,11 @@ class EvolutionSearch:
         self._best = max(self._best, *grades)
         self._stale = 0 if better else self._stale + 1
 
-    def _begin(self) -> None:
-        """Begin at another point."""
-        import cma  # takes 0.3 s
+    def _begun(self) -> Any:
+        """A strategy that begins at a random point."""
+        import cma
 
-        x0 = self.rng.random(self.space.dimension)
+        first = np.clip(self.rng.random(self.space.dimension), 0.02, 0.98)
         options: dict[str, Any] = {
             "bounds": [0.0, 1.0],
             "popsize": GENERATION,
@@ -52,5 +53,4 @@ class EvolutionSearch:
             "verb_disp": 0,
             "verb_log": 0,
         }
-        self._strategy = cma.CMAEvolutionStrategy(np.clip(x0, 0.02, 0.98), SIGMA, options)
-        self._best, self._stale = -np.inf, 0
+        return cma.CMAEvolutionStrategy(first, SIGMA, options)

@@ -53,7 +53,7 @@ class Episode:
     sumo_collisions: frozenset[tuple[str, str]] = frozenset()
     teleports: int = 0
     emergency_stops: int = 0
-    seen: list[Snapshot] = field(default_factory=list)
+    seen: list[Snapshot] = field(default_factory=list, compare=False, repr=False)
     frames: list[Snapshot] = field(default_factory=list)
     actions: list[Joint] = field(default_factory=list)
     starts: tuple[Start, ...] = ()

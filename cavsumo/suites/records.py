@@ -46,7 +46,7 @@ class EvenSteps(SuiteRecord):
         return [int(number) if number.is_integer() else number for number in found]
 
 
-class Cells(SuiteRecord):
+class CellRange(SuiteRecord):
     """A block of cases: all combinations of the values of some parameters."""
 
     range: Literal["standard", "extended"] = "standard"
@@ -91,7 +91,7 @@ class SuiteTest(SuiteRecord):
     net: str
     ego_route: tuple[str, ...]
     case: tuple[str, ...] = ()
-    cells: tuple[Cells, ...] = Field(min_length=1)
+    cells: tuple[CellRange, ...] = Field(min_length=1)
     values: dict[str, Number] = Field(default_factory=dict)
     shown: tuple[str, ...] = ()
     vary_by: dict[str, tuple[float, float]] = Field(default_factory=dict)

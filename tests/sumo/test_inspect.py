@@ -220,6 +220,7 @@ def test_a_picture_is_drawn_without_a_screen(
 ) -> None:
     """A PNG of the best junction; the same again is the same bytes; pyplot is not needed."""
     monkeypatch.delenv("DISPLAY", raising=False)
+    monkeypatch.delitem(sys.modules, "matplotlib.pyplot", raising=False)  # of another test
     files = [tmp_path / "a.png", tmp_path / "b.png"]
     for file in files:
         assert (

@@ -13,6 +13,7 @@ from support import benchmark, rows
 
 import cavsumo
 from cavsumo.egos import Acceleration
+from cavsumo.results.trace_file import read_trace_text
 
 NAME = "euroncap-2026"
 TRACKS = benchmark("reference_tracks")
@@ -102,7 +103,7 @@ def test_a_car_that_cuts_in_has_its_gap_and_its_lateral_speed(tmp_path: Path) ->
     """When it has it, and afterwards it is in the ego's lane; the case says what is preventable."""
     how: dict[str, Any] = {"trace": "all", "progress": False, "output": tmp_path / "a.csv"}
     cut_in = cavsumo.suite("un-r157", "constant", only="cut-in/50/20/25/1.5", **how)
-    track = TRACKS.played_track(tmp_path / "a" / "run000000.jsonl")
+    track = TRACKS.played_track(tmp_path / "a" / "run000000.jsonl.gz")
     ego, other = next(pair for pair in track.states if pair[0][0] >= 3.0 - 1e-9)
     assert other[1] - ego[1] - 4.3 == pytest.approx(25.0, abs=0.02)
     after = [pair[1] for pair in track.states if 3.1 < pair[0][0] < 4.0]
@@ -117,7 +118,7 @@ def test_the_target_commits_once(tmp_path: Path) -> None:
     cavsumo.suite(NAME, "constant", output=tmp_path / "a.csv", **how)
     brakes = cavsumo.suite(NAME, Brakes(20.0), output=tmp_path / "b.csv", **how)
     assert list(brakes.rows["outcome"]) == ["held"]
-    tracks = [TRACKS.played_track(tmp_path / one / "run000000.jsonl") for one in "ab"]
+    tracks = [TRACKS.played_track(tmp_path / one / "run000000.jsonl.gz") for one in "ab"]
     targets = [[target for _, target in track.states] for track in tracks]
     assert targets[1][: len(targets[0])] == targets[0]
 
@@ -156,7 +157,7 @@ def test_a_parked_car_hides_the_child_from_a_sensor(tmp_path: Path) -> None:
         results = cavsumo.suite(
             NAME, Brakes(35.0), output=tmp_path / "a.csv", overwrite=True, **how | sensor
         )
-        frames = (tmp_path / "a" / "run000000.jsonl").read_text(encoding="utf-8").splitlines()[1:]
+        frames = read_trace_text(tmp_path / "a" / "run000000.jsonl.gz").splitlines()[1:]
         speeds = [json.loads(frame)["ego"][2] for frame in frames]
         assert len(results) == 1
         return next(i for i, v in enumerate(speeds) if v < 11.0)
