@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from cavsumo.api.results import load as load
     from cavsumo.api.running import run as run
     from cavsumo.api.running import run_study as run_study
+    from cavsumo.api.running import search as search
     from cavsumo.api.suites import suite as suite
     from cavsumo.assertions.base import Assertion as Assertion
     from cavsumo.assertions.base import Judgement as Judgement
@@ -39,6 +40,7 @@ __version__ = "0.1.0"
 _PUBLIC = {
     "run": "api.running",
     "run_study": "api.running",
+    "search": "api.running",
     "load": "api.results",
     "suite": "api.suites",
     "Results": "api.results",

@@ -44,7 +44,7 @@ class Agent:
             that are far from everybody are left out of the snapshots.
         drives: whether its bodies may be vehicles. Set False where it can only walk.
         learns: whether episodes change what it knows: then they are played in sequence.
-        searches: whether a searcher tells it before each episode what to play (``search``).
+        searches: whether a searcher tells it before each episode what to play (``searchers``).
         promise: the class of egos for which its forecasts hold; empty for none.
         manoeuvre: the one manoeuvre that its vehicles are asked to do (``manoeuvres.MANOEUVRES``):
             they start where it is possible; "auto" for whichever is possible where they start.

@@ -1,8 +1,8 @@
 """A pedestrian's programme: legs across the road, begun as the ego comes to a certain place.
 
-A programme is a few numbers, so that a search can vary it (``search.space``): when the body steps
-off, two legs with a pause between them, and the direction in which it leaves. Places and directions
-are relative to the ego's path, so a programme makes sense on any road.
+A programme is a few numbers, so that a search can vary it (``searchers.space``): when the body
+steps off, two legs with a pause between them, and the direction in which it leaves. Places and
+directions are relative to the ego's path, so a programme makes sense on any road.
 """
 
 from __future__ import annotations

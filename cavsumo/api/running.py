@@ -8,6 +8,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
+from cavsumo.agents.names import SEARCH
 from cavsumo.api.keywords import settings_of
 from cavsumo.api.results import Results, TemporaryFolder
 from cavsumo.batch.manner import Manner, Means
@@ -72,6 +73,29 @@ def run(
     order = Order((part,), manner, means_of(jobs, executor, scheduler), places=places)
     (found,) = results_of(order, output, objects)
     return found
+
+
+def search(
+    net: str | os.PathLike[str] | Scenario | None = None,
+    *,
+    method: str = "portfolio",
+    **arguments: Any,
+) -> Results:
+    """Search for preventable failures of an ego, as ``cavsumo search`` does.
+
+    Args:
+        net: see ``run``.
+        method: of the search: portfolio, random, manoeuvres, neighbours, cma (docs/search.md).
+        **arguments: those of ``run``; there is one tester unless ``testers`` says otherwise.
+
+    Returns and raises as ``run``.
+    """
+    if "agents" in arguments:
+        raise InputError("search: agents: expected none, it has an agent of its own")
+    params = {**arguments.pop("params", {}), f"{SEARCH}.method": method}
+    if not isinstance(net, Scenario) and not arguments.get("config"):
+        arguments.setdefault("testers", 1)
+    return run(net, agents=[SEARCH], params=params, **arguments)
 
 
 def run_study(

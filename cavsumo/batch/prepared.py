@@ -34,7 +34,7 @@ from cavsumo.network.traffic import Volume
 from cavsumo.network.traffic_lights import Pace
 from cavsumo.results.present import input_files
 from cavsumo.results.provenance import checksums, traffic_checksum, unequal, versions
-from cavsumo.search.space import space_of
+from cavsumo.searchers.space import space_of
 from cavsumo.suites.cases import case_plan, case_plans, suite_inputs
 from cavsumo.sumo.options import OPTIONS
 

@@ -22,10 +22,10 @@ from cavsumo.errors import ResultsError
 from cavsumo.model.bodies import kind_named
 from cavsumo.results.grade import INVALID_GRADE
 from cavsumo.results.rows import cell
-from cavsumo.search.methods import searcher_of
-from cavsumo.search.searchers import PlayedPoint
-from cavsumo.search.space import Point, Space, space_of
-from cavsumo.search.words import in_common
+from cavsumo.searchers.methods import searcher_of
+from cavsumo.searchers.protocol import PlayedPoint
+from cavsumo.searchers.space import Point, Space, space_of
+from cavsumo.searchers.words import in_common
 
 SPEED_BIN_MPS, PLACE_BIN_M = 2.0, 10.0  # failures within a bin are alike
 

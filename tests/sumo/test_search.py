@@ -5,16 +5,18 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import pytest
 from support import rows, traces
 
+import cavsumo
 from cavsumo.cli import main
 from cavsumo.errors import Exit, NetworkError
 from cavsumo.model.bodies import PEDESTRIAN
 from cavsumo.model.scenario import BatchPlan
 from cavsumo.network.site import Site
-from cavsumo.search.space import space_of
+from cavsumo.searchers.space import space_of
 
 Capture = pytest.CaptureFixture[str]
 RUNS = 24
@@ -121,3 +123,12 @@ def test_a_route_that_nobody_can_meet_is_refused(
     _, site = staged("pedestrians")
     with pytest.raises(NetworkError, match="a search finds no place for a pedestrian"):
         space_of(dataclasses.replace(site, areas=()), PEDESTRIAN, ((0,),))
+
+
+def test_python_searches_alike(found: Path, tmp_path: Path) -> None:
+    """The same rows as the command; an agent cannot be chosen."""
+    how: dict[str, Any] = {"ego": "constant", "runs": RUNS, "progress": False}
+    results = cavsumo.search("pedestrians", output=_folder(tmp_path / "api"), **how)
+    assert rows(results.file) == rows(found)
+    with pytest.raises(cavsumo.InputError, match="search: agents"):
+        cavsumo.search("pedestrians", agents=["timing"], **how)

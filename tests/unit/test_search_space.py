@@ -16,11 +16,11 @@ from cavsumo.model.bodies import PEDESTRIAN
 from cavsumo.model.scenario import BatchPlan
 from cavsumo.network.site import Site
 from cavsumo.results.grade import INVALID_GRADE, grade
-from cavsumo.search.manoeuvres import MANOEUVRES, ManoeuvreSearch
-from cavsumo.search.methods import SEARCHERS, searcher_of
-from cavsumo.search.searchers import GENERATION, PlayedPoint
-from cavsumo.search.space import NAMES, Point, Space, programme, space_of
-from cavsumo.search.words import in_common
+from cavsumo.searchers.manoeuvres import MANOEUVRES, ManoeuvreSearch
+from cavsumo.searchers.methods import SEARCHERS, searcher_of
+from cavsumo.searchers.protocol import GENERATION, PlayedPoint
+from cavsumo.searchers.space import NAMES, Point, Space, programme, space_of
+from cavsumo.searchers.words import in_common
 from cavsumo.simulation.avoidability import Avoidability
 
 

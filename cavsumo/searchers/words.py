@@ -7,7 +7,7 @@ from collections.abc import Callable, Sequence
 from statistics import median
 
 from cavsumo.agents.programme import WalkProgramme
-from cavsumo.search.space import DEPTHS_M, Place
+from cavsumo.searchers.space import DEPTHS_M, Place
 
 Failure = tuple[Place, WalkProgramme]
 

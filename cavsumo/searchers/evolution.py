@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from cavsumo.search.searchers import GENERATION, PlayedPoint
-from cavsumo.search.space import Point, Space
+from cavsumo.searchers.protocol import GENERATION, PlayedPoint
+from cavsumo.searchers.space import Point, Space
 
 SIGMA = 0.22
 STALE = 10  # generations without progress before a restart

@@ -8,7 +8,7 @@ from typing import NamedTuple, Protocol
 
 import numpy as np
 
-from cavsumo.search.space import Point, Space
+from cavsumo.searchers.space import Point, Space
 
 GENERATION = 10  # points that are chosen together, before any of them is played
 

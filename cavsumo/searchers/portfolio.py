@@ -6,11 +6,11 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from cavsumo.search.evolution import EvolutionSearch
-from cavsumo.search.manoeuvres import ManoeuvreSearch
-from cavsumo.search.neighbours import NeighbourSearch
-from cavsumo.search.searchers import PlayedPoint, RandomSearch, Searcher
-from cavsumo.search.space import Point, Space
+from cavsumo.searchers.evolution import EvolutionSearch
+from cavsumo.searchers.manoeuvres import ManoeuvreSearch
+from cavsumo.searchers.neighbours import NeighbourSearch
+from cavsumo.searchers.protocol import PlayedPoint, RandomSearch, Searcher
+from cavsumo.searchers.space import Point, Space
 
 FIRST = 3  # generations of known manoeuvres before the others take part
 FORGET = 0.8  # weight of what an earlier generation found

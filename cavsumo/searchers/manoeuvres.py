@@ -11,8 +11,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from cavsumo.search.searchers import GENERATION, PlayedPoint
-from cavsumo.search.space import NAMES, Point, Space
+from cavsumo.searchers.protocol import GENERATION, PlayedPoint
+from cavsumo.searchers.space import NAMES, Point, Space
 
 Range = tuple[float, float]
 STRAIGHT: Range = (0.45, 0.55)

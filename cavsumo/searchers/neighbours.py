@@ -11,8 +11,8 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from cavsumo.search.searchers import GENERATION, PlayedPoint, Searcher
-from cavsumo.search.space import NAMES, Point, Space
+from cavsumo.searchers.protocol import GENERATION, PlayedPoint, Searcher
+from cavsumo.searchers.space import NAMES, Point, Space
 
 MANNER = ("speed", "heading", "depth")  # numbers whose thirds tell manners of walking apart
 BEST, SHARE_OF_BEST = 4, 0.6  # how often one of so many best points is varied

@@ -6,12 +6,12 @@ from collections.abc import Callable, Mapping
 
 import numpy as np
 
-from cavsumo.search.evolution import EvolutionSearch
-from cavsumo.search.manoeuvres import ManoeuvreSearch
-from cavsumo.search.neighbours import NeighbourSearch
-from cavsumo.search.portfolio import Portfolio
-from cavsumo.search.searchers import RandomSearch, Searcher
-from cavsumo.search.space import Space
+from cavsumo.searchers.evolution import EvolutionSearch
+from cavsumo.searchers.manoeuvres import ManoeuvreSearch
+from cavsumo.searchers.neighbours import NeighbourSearch
+from cavsumo.searchers.portfolio import Portfolio
+from cavsumo.searchers.protocol import RandomSearch, Searcher
+from cavsumo.searchers.space import Space
 
 
 def _neighbours(space: Space, rng: np.random.Generator) -> Searcher:
