@@ -138,12 +138,6 @@ class Game:
     @cached_property
     def entering(self) -> tuple[Ints, Ints]:
         """The cells with an outcome into each state: (where those of each state begin, cells)."""
-        if self.fast:
-            from cavsumo.games.compiled import graphs
-
-            compiled: tuple[Ints, Ints]
-            compiled = graphs.entering(self.outcome_start, self.successor, self.n_states)
-            return compiled
         from scipy.sparse import csr_matrix
 
         there = np.ones(len(self.successor), dtype=bool)

@@ -1,4 +1,4 @@
-"""Loops of ``model``, ``regions`` (attractors), ``segments``, ``arena`` and ``reach``."""
+"""Loops of ``regions`` (attractors), ``segments``, ``arena`` (cells laid out) and ``reach``."""
 
 from __future__ import annotations
 
@@ -74,27 +74,20 @@ def gathered(start, successor, probability, which, number):  # type: ignore[no-u
 
 
 @njit(cache=True, nogil=True)
-def entering(start, column, n):  # type: ignore[no-untyped-def]
-    """The rows with an entry in each of n columns, and where those of each column begin."""
+def reaching(start, column):  # type: ignore[no-untyped-def]
+    """As ``reach.reaching``: from the last state backward, over the entries in each column."""
+    n = len(start) - 1
     begin = np.zeros(n + 1, dtype=np.int64)
-    for k in range(start[-1]):
+    for k in range(start[n]):
         begin[column[k] + 1] += 1
     for s in range(n):
         begin[s + 1] += begin[s]
     place = begin[:-1].copy()
-    source = np.empty(start[-1], dtype=np.int32)
-    for s in range(len(start) - 1):
+    source = np.empty(start[n], dtype=np.int32)
+    for s in range(n):
         for k in range(start[s], start[s + 1]):
             source[place[column[k]]] = s
             place[column[k]] += 1
-    return begin, source
-
-
-@njit(cache=True, nogil=True)
-def reaching(start, column):  # type: ignore[no-untyped-def]
-    """As ``reach.reaching``: from the last state backward, over the entries in each column."""
-    n = len(start) - 1
-    begin, source = entering(start, column, n)
     found = np.zeros(n, dtype=np.bool_)
     waiting = np.empty(n, dtype=np.int64)
     found[n - 1] = True
