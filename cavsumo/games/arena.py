@@ -118,11 +118,11 @@ def arena(game: Game, reading: Reading, live: Ints, kept: Bools | None = None) -
     if ego_first:
         order, start, groups = game.replies
     else:
-        order, start, groups = np.arange(game.n_cells), game.cell_start, game.row_start
+        order, start, groups = None, game.cell_start, game.row_start
     group = spans(groups, live, game.fast)
     place = spans(start, group, game.fast)
     group_size, state_size = np.diff(start)[group], np.diff(groups)[live]
-    cells = order[place]
+    cells = place if order is None else order[place]
     if kept is not None:
         owner = np.repeat(np.arange(len(group)), group_size)[kept[cells]]
         cells = cells[kept[cells]]

@@ -49,12 +49,13 @@ def backup(arena: Arena, value: Floats) -> tuple[Floats, Ints]:
     return np.append(best, 0.0), cell[group]
 
 
-def answers(arena: Arena, value: Floats, advantage: Floats | None = None) -> Ints:
-    """For each group the cell that the answering player takes; ``advantage`` if it is known."""
-    if len(arena.group_cell) - 1 == len(arena.cells):
-        return np.arange(len(arena.cells))  # no choice
+def answers(arena: Arena, value: Floats) -> Ints:
+    """For each group the cell that the answering player takes."""
+    return answers_by(arena, arena.advantages(value))
+
+
+def answers_by(arena: Arena, advantage: Floats) -> Ints:
+    """The same where the advantages of the cells are known."""
     _, inner = _operators(arena)
-    if advantage is None:
-        advantage = arena.advantages(value)
     best = inner.reduceat(advantage, arena.group_cell[:-1])
     return firsts(np.flatnonzero(advantage == best[arena.cell_group]), arena.cell_group)

@@ -26,10 +26,10 @@ from typing import Any
 
 import numpy as np
 
-from cavsumo.games.advantages import advantages
-from cavsumo.games.components import EPSILON, magnitude
+from cavsumo.games.components import EPSILON
 from cavsumo.games.model import Bools, Floats, Game, GameError, Ints
 from cavsumo.games.readings import Reading
+from cavsumo.games.rounding import advantages_of
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,13 +66,14 @@ def lower_holds(game: Game, reading: Reading, lower: Floats, tester: Floats) -> 
     """Whether a lower bound is proven by a policy of the tester."""
     if not game.n_cells:
         return True
-    advantage, error = advantages_of(game, lower)
-    worst = advantage - error
     if reading is Reading.A:
-        return bool((worst[tester > 0] >= 0).all())
+        return bool((_least(game, lower, np.flatnonzero(tester > 0), 1.0) >= 0).all())
     order, start, _ = game.replies
     inside = np.isfinite(lower[game.cell_state[order[start[:-1]]]])
-    return bool((_mixed(tester[order], worst[order], start)[inside] >= 0).all())
+    weights = tester[order]
+    used = np.flatnonzero(weights > 0)
+    gain = _least(game, lower, order[used], 1.0)
+    return bool((_mixed(weights, used, gain, start)[inside] >= 0).all())
 
 
 def upper_holds(game: Game, reading: Reading, upper: Floats, ego: Floats, kept: Bools) -> bool:
@@ -83,36 +84,34 @@ def upper_holds(game: Game, reading: Reading, upper: Floats, ego: Floats, kept: 
     """
     if not game.n_cells:
         return True
-    advantage, error = advantages_of(game, upper)
-    best = advantage + error
     if reading is Reading.C:
-        return bool((best[(ego > 0) & kept] <= 0).all())
-    return bool((_mixed(ego, -best, game.cell_start)[kept[game.cell_start[:-1]]] >= 0).all())
+        return bool((_least(game, upper, np.flatnonzero((ego > 0) & kept), -1.0) >= 0).all())
+    used, start = np.flatnonzero(ego > 0), game.cell_start
+    gain = _least(game, upper, used, -1.0)
+    return bool((_mixed(ego, used, gain, start)[kept[start[:-1]]] >= 0).all())
 
 
-def advantages_of(game: Game, value: Floats) -> tuple[Floats, Floats]:
-    """The advantage q(c) - V(s) of every cell, and a bound on its rounding error.
+def _least(game: Game, value: Floats, cells: Ints, sign: float) -> Floats:
+    """The advantages of cells, with a sign, lowered by the largest rounding error."""
+    advantage, error = advantages_of(game, value, cells)
+    return sign * advantage - error
 
-    A sum of k products is wrong by at most k half-units of the last place of its terms (half of
-    epsilon each), every term by three (p, the difference, the product), and probabilities that do
-    not exactly sum to 1 add k more.
+
+def _mixed(weights: Floats, used: Ints, gain: Floats, start: Ints) -> Floats:
+    """Sums of weights times gains over the parts, lowered by the largest rounding error.
+
+    Args:
+        weights: of each entry of the parts.
+        used: the entries with a positive weight, ascending.
+        gain: of those.
+        start: where the parts begin.
     """
-    finite = np.where(np.isfinite(value), value, 0.0)
-    parts = (game.outcome_start, game.successor, game.probability, game.reward, game.cell_state)
-    advantage, size = advantages(*parts, finite, game.fast)
-    size *= np.diff(game.outcome_start) + 4
-    size += 2.0 * magnitude(game)
-    return advantage, EPSILON * size
-
-
-def _mixed(weights: Floats, gain: Floats, start: Ints) -> Floats:
-    """Sums of weights times gains over the parts, lowered by the largest rounding error."""
-    used = np.flatnonzero(weights)
     if len(used) == len(start) - 1 and (weights[used] == 1.0).all():
         in_turn = (start[:-1] <= used) & (used < start[1:])
         if in_turn.all():  # one in each part
-            return gain[used]
-    product = np.where(weights > 0, weights * gain, 0.0)
+            return gain
+    product = np.zeros(len(weights))
+    product[used] = weights[used] * gain
     total = np.add.reduceat(product, start[:-1])
     room = (np.diff(start) + 4) * EPSILON * np.add.reduceat(np.abs(product), start[:-1])
     return total - np.where(np.maximum.reduceat(weights, start[:-1]) == 1.0, 0.0, room)
@@ -153,7 +152,8 @@ def _by_row(game: Game, tester: Floats, inside: Bools) -> bool:
     """The tester's weights are those of rows and sum to 1 in each state."""
     rows = tester[game.cell_start[:-1]]
     total = np.bincount(game.row_state, rows, game.n_states)
-    return bool((rows[game.cell_row] == tester).all()) and _one(total[inside & ~game.goal])
+    same = (np.repeat(rows, np.diff(game.cell_start)) == tester).all()
+    return bool(same) and _one(total[inside & ~game.goal])
 
 
 def _by_group(game: Game, ego: Floats, inside: Bools) -> bool:

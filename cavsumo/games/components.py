@@ -127,16 +127,7 @@ def _program(
 
 def _reward_error(game: Game, cells: Ints) -> Floats:
     """Bound on the errors of the expected rewards of cells."""
-    return 4.0 * EPSILON * magnitude(game)[cells]
-
-
-def magnitude(game: Game) -> Floats:
-    """For each cell the sum of the terms in its expected reward, without their signs."""
-    each = game.outcome_reward
-    if each is None or game.exact is not None or not game.n_cells:
-        return np.abs(game.reward)
-    terms: Floats = np.add.reduceat(game.probability * np.abs(each), game.outcome_start[:-1])
-    return terms * (1.0 + np.diff(game.outcome_start))  # the sum was rounded at each term
+    return 4.0 * EPSILON * game.magnitude[cells]
 
 
 def _rounding(game: Game, component: EndComponent, part: Any, potential: Floats) -> Floats:

@@ -119,6 +119,15 @@ class Game:
         return self.row_state[self.cell_row]
 
     @cached_property
+    def magnitude(self) -> Floats:
+        """For each cell the sum of the terms in its expected reward, without their signs."""
+        each = self.outcome_reward
+        if each is None or self.exact is not None or not self.n_cells:
+            return np.abs(self.reward)
+        terms: Floats = np.add.reduceat(self.probability * np.abs(each), self.outcome_start[:-1])
+        return terms * (1.0 + np.diff(self.outcome_start))  # the sum was rounded at each term
+
+    @cached_property
     def matrix(self) -> Any:
         """T as a scipy CSR matrix, cells by states."""
         from scipy.sparse import csr_matrix

@@ -26,7 +26,7 @@ from cavsumo.games.model import Bools, Game, Ints
 from cavsumo.games.readings import Reading
 from cavsumo.games.segments import firsts, spans
 
-NEVER = np.iinfo(np.int32).max  # so many missing parts that it is never complete
+NEVER = np.int32(np.iinfo(np.int32).max)  # so many missing parts that it is never complete
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,7 +64,7 @@ def almost_sure_region(game: Game, reading: Reading = Reading.A) -> Region:
     first: Bools | None = None
     while True:
         allowed = keeping(game, reading, inside)
-        layer, moves = _attract(game, reading is not Reading.A, allowed, 1)
+        layer, moves = _attract(game, reading is not Reading.A, allowed, np.int32(1))
         joined = layer >= 0
         first = ~joined if first is None else first
         if (joined == inside).all():
@@ -135,7 +135,8 @@ def _attract(game: Game, ego_first: bool, allowed: Bools, lacking: Any) -> tuple
 
 
 def _level(lacking: Ints, whole: Ints) -> _Level:
-    return _Level(np.full(len(lacking), -1, np.int32), lacking.astype(np.int32), whole)
+    lacking = lacking.astype(np.int32, copy=False)
+    return _Level(np.full(len(lacking), -1, np.int32), lacking, whole)
 
 
 def _spread(game: Game, cells: _Level, groups: _Level, states: _Level) -> None:

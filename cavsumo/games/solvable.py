@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from cavsumo.games.components import EPSILON, end_components, gain, magnitude
+from cavsumo.games.components import EPSILON, end_components, gain
 from cavsumo.games.model import Bools, Game, Ints
 from cavsumo.games.readings import Reading
 from cavsumo.games.regions import Region, almost_sure_region, sure_region
@@ -99,7 +99,7 @@ def free_cycle(game: Game) -> Cycle | None:
     """
     if not game.n_cells:
         return None
-    negative = game.reward < -8.0 * EPSILON * magnitude(game)
+    negative = game.reward < -8.0 * EPSILON * game.magnitude
     if negative.all():
         return None
     if (game.reward <= 0).all():

@@ -25,7 +25,7 @@ import numpy as np
 from cavsumo.errors import CavsumoError
 from cavsumo.games.approach import Tell, approach
 from cavsumo.games.arena import arena
-from cavsumo.games.certificate import Certificate, advantages_of, holds
+from cavsumo.games.certificate import Certificate, holds
 from cavsumo.games.components import EPSILON
 from cavsumo.games.flow import best_order
 from cavsumo.games.model import Bools, Floats, Game, Ints
@@ -33,6 +33,7 @@ from cavsumo.games.pairs import coarseness
 from cavsumo.games.plays import Play, made_proper, time_of, value_of
 from cavsumo.games.readings import Reading
 from cavsumo.games.regions import keeping
+from cavsumo.games.rounding import noise_of
 from cavsumo.games.simultaneous import Simultaneous
 from cavsumo.games.solvable import Solvability, solvability
 from cavsumo.games.turn_based import TurnBased
@@ -244,21 +245,13 @@ def _width(found: Certificate) -> float:
 
 
 def _noise(game: Game, reading: Reading, play: Play, value: Floats, left: float) -> Floats:
-    """For each state a generous bound on the rounding error of an advantage that is exactly 0.
-
-    Most relevant cells lead to states of nearly the same value; only the others, such as an
-    accident with a large loss, have an error above a unit of the last place.
-    """
+    """For each state a bound on the rounding error of an advantage that is exactly 0."""
     whole = np.zeros(game.n_states)
     whole[play.arena.states] = value[:-1]
-    advantage, error = advantages_of(game, whole)
-    error *= 4.0
-    near = np.flatnonzero(np.abs(advantage) <= 2.0 * (error + left))
     if reading is Reading.B:  # advantages cancel in a mixture
-        near = np.arange(game.n_cells)
-        error += 24.0 * coarseness(value)
-    most = np.zeros(game.n_states)
-    np.maximum.at(most, game.cell_state[near], error[near])
+        most = noise_of(game, whole, np.inf, 24.0 * coarseness(value))
+    else:
+        most = noise_of(game, whole, left, 0.0)
     return np.append(most[play.arena.states], 0.0)
 
 

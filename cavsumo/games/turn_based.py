@@ -57,7 +57,7 @@ class TurnBased:
         a = self.arena
         advantage = a.advantages(value)
         if a.reading is Reading.A:
-            pair = backups.answers(a, value, advantage)[held]
+            pair = backups.answers_by(a, advantage)[held]
         else:
             best = np.minimum.reduceat(advantage[held], a.state_group[:-1])
             attained = np.flatnonzero(advantage[held] == best[a.group_state])
@@ -68,7 +68,7 @@ class TurnBased:
         """See ``Play``."""
         a = self.arena
         advantage = a.advantages(value)
-        answers = backups.answers(a, value, advantage)
+        answers = backups.answers_by(a, advantage)
         if a.reading is Reading.C:
             return np.where(advantage[answers] > advantage[held] + margin, answers, held)
         worth = advantage[answers]
@@ -86,7 +86,7 @@ class TurnBased:
         """See ``Play``."""
         a = self.arena
         if a.reading is Reading.A:
-            return np.where(where, backups.answers(a, value)[self.first], pair)
+            return np.where(where, self._answers(value)[self.first], pair)
         return np.where(where, self.first[a.cell_group[pair]], pair)
 
     def system(self, pair: Ints) -> tuple[Any, Floats]:
@@ -98,19 +98,26 @@ class TurnBased:
     def tester(self, game: Game, pair: Ints, value: Floats) -> Floats:
         """See ``Play``."""
         if self.arena.reading is Reading.C:
-            return self._answers(game, value)
+            return self._answering(game, value)
         return self._choices(game, pair, game.cell_row)
 
     def ego(self, game: Game, pair: Ints, value: Floats) -> Floats:
         """See ``Play``."""
         if self.arena.reading is Reading.A:
-            return self._answers(game, value)
+            return self._answering(game, value)
         return self._choices(game, pair, game.ego_action)
 
-    def _answers(self, game: Game, value: Floats) -> Floats:
-        """The answers of the player that moves second, in every group of cells."""
+    def _answers(self, value: Floats) -> Ints:
+        """For each group of cells the one that the player who moves second takes."""
+        if len(self.arena.group_cell) - 1 == len(self.arena.cells):
+            return np.arange(len(self.arena.cells))  # no choice
+        found: Ints = self._bellman.answers(self.arena, value)
+        return found
+
+    def _answering(self, game: Game, value: Floats) -> Floats:
+        """The answers as weights of the game's cells."""
         weights = np.zeros(game.n_cells)
-        weights[self.arena.cells[backups.answers(self.arena, value)]] = 1.0
+        weights[self.arena.cells[self._answers(value)]] = 1.0
         return weights
 
     def _choices(self, game: Game, pair: Ints, key: Ints) -> Floats:

@@ -20,6 +20,7 @@ from cavsumo.games import (
     Stationary,
     Unsolvable,
     almost_sure_region,
+    compiled,
     from_callable,
     from_transitions,
     holds,
@@ -38,6 +39,7 @@ from cavsumo.games import (
 from cavsumo.games.components import end_components, gain
 from cavsumo.games.files import game_of
 from cavsumo.games.policies import EGO, ego_actions
+from cavsumo.games.rounding import advantages_of, noise_of
 
 VECTORS = json.loads((DATA / "ssp_games.json").read_text(encoding="utf-8"))
 CASES = {case["id"]: case for case in VECTORS["cases"]}
@@ -177,8 +179,6 @@ def test_the_ring_is_the_one_of_the_rules(ring: Game) -> None:
 def test_the_compiled_loops_are_the_same(ring: Game, monkeypatch: pytest.MonkeyPatch) -> None:
     """With numba and without: the same regions, moves and all, and bounds that agree."""
     pytest.importorskip("numba")
-    from cavsumo.games import compiled
-
     for reading in (Reading.A, Reading.C):
         monkeypatch.setattr(compiled, "COMPILED", 0)
         fast = solve(ring, reading)
@@ -190,6 +190,44 @@ def test_the_compiled_loops_are_the_same(ring: Game, monkeypatch: pytest.MonkeyP
             assert (one.moves == other.moves).all()
         assert holds(ring, fast.certificate)
         assert fast.lower == pytest.approx(plain.lower, abs=1e-6)
+
+
+def test_errors_of_advantages_are_bounded() -> None:
+    """The advantage of every cell, in rationals, is within the bound on the rounding error."""
+    game, rng = game_of(CASES["risky_or_safe"]), np.random.default_rng(0)
+    assert game.exact is not None
+    value = np.where(game.goal, 0.0, rng.normal(0, 1e6, game.n_states))
+    advantage, error = advantages_of(game, value, np.arange(game.n_cells))
+    for cell in range(game.n_cells):
+        state, numbers = int(game.cell_state[cell]), game.exact.probability
+        span = range(int(game.outcome_start[cell]), int(game.outcome_start[cell + 1]))
+        mean = sum(numbers[k] * Fraction(value[game.successor[k]]) for k in span)
+        exact = game.exact.reward[cell] + mean - Fraction(value[state])
+        assert abs(exact - Fraction(advantage[cell])) <= Fraction(error[cell])
+
+
+def test_advantages_of_some_cells_are_those_of_all(
+    ring: Game, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """To the last bit, with numba and without; the noise of a state is its largest error."""
+    pytest.importorskip("numba")
+    value = np.where(ring.goal, 0.0, -np.random.default_rng(0).random(ring.n_states))
+    some, every = np.arange(5, ring.n_cells, 7), np.arange(ring.n_cells)
+    found = []
+    for least in (0, math.inf):
+        monkeypatch.setattr(compiled, "COMPILED", least)
+        advantage, error = advantages_of(ring, value, every)
+        for part, whole in zip(advantages_of(ring, value, some), (advantage, error), strict=True):
+            assert (part == whole[some]).all()
+        noise = noise_of(ring, value, np.inf, 1e-3)
+        most = np.zeros(ring.n_states)
+        np.maximum.at(most, ring.cell_state, 4.0 * error + 1e-3)
+        assert (noise == most).all()
+        errors = np.concatenate([error, noise, noise_of(ring, value, 0.1, 0.0)])
+        found.append((advantage, errors))
+    (fast, errors_fast), (plain, errors_plain) = found  # whose orders of sums differ
+    assert fast == pytest.approx(plain, rel=0, abs=1e-12)
+    assert errors_fast == pytest.approx(errors_plain, rel=1e-9, abs=0)
 
 
 def test_an_unsolvable_game_names_its_trap() -> None:
@@ -306,10 +344,16 @@ def test_a_game_from_a_function() -> None:
     assert solve(game).lower[0] == pytest.approx(-10 / 3, abs=1e-6)
 
 
-def test_a_wrong_certificate_does_not_hold(ring: Game) -> None:
-    """The check refuses bounds that are too tight, and policies that are none."""
+@pytest.mark.parametrize("fast", [False, True])
+def test_a_wrong_certificate_does_not_hold(
+    ring: Game, fast: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The check refuses bounds that are too tight, in one state too, and policies that are none."""
     import dataclasses
 
+    if fast:
+        pytest.importorskip("numba")
+    monkeypatch.setattr(compiled, "COMPILED", 0 if fast else math.inf)
     found = solve(ring).certificate
     assert holds(ring, found)
     middle = (found.lower + found.upper) / 2
@@ -317,6 +361,10 @@ def test_a_wrong_certificate_does_not_hold(ring: Game) -> None:
     lowered = np.where(ring.goal, 0.0, middle - 1e-3)
     assert not holds(ring, dataclasses.replace(found, lower=raised))
     assert not holds(ring, dataclasses.replace(found, upper=lowered))
+    there = np.arange(ring.n_states) == ring.initial
+    for bound, moved in (("lower", raised), ("upper", lowered)):
+        wrong: Any = {bound: np.where(there, moved, getattr(found, bound))}
+        assert not holds(ring, dataclasses.replace(found, **wrong))
     assert not holds(ring, dataclasses.replace(found, tester=np.zeros(ring.n_cells)))
     assert not holds(ring, dataclasses.replace(found, ego=found.ego * 0.5))
     with pytest.raises(GameError, match="rationals"):

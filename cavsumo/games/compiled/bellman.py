@@ -78,3 +78,24 @@ def _backup(sign, states, groups, cells, successor, probability, reward, value, 
                 best, taken = least, answer
         out[s] = sign * best
         chosen[s] = taken
+
+
+def answers(arena: Arena, value: Floats) -> Ints:
+    """For each group the cell that the answering player takes."""
+    chosen = np.empty(len(arena.group_cell) - 1, dtype=np.int64)
+    _answers(*_parts(arena), value, chosen)
+    return chosen
+
+
+@njit(cache=True, nogil=True)
+def _answers(sign, states, groups, cells, successor, probability, reward, value, chosen):  # type: ignore[no-untyped-def]
+    for s in range(len(states) - 1):
+        for g in range(states[s], states[s + 1]):
+            least = math.inf
+            for c in range(groups[g], groups[g + 1]):
+                advantage = 0.0
+                for k in range(cells[c], cells[c + 1]):
+                    advantage += probability[k] * (value[successor[k]] - value[s])
+                advantage = sign * (advantage + reward[c])
+                if advantage < least:
+                    least, chosen[g] = advantage, c
