@@ -391,3 +391,18 @@ def test_the_tables_of_the_experiments(
     assert len(written) == tables
     assert len(written["rates" if name == "tables" else "games"]) == 2 + 2 * (1 + (name == "games"))
     assert (tmp_path / "agency.csv").is_file() == (name == "tables")
+
+
+def test_scores_against_faulty_drivers(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """One driver, ten episodes of a search and of timing."""
+    monkeypatch.syspath_prepend(str(ROOT / "experiments" / "search"))
+    monkeypatch.setenv("PYTHONPATH", "")
+    words = ["score.py", "--driver", "LetsGo", "--seeds", "1", "--episodes", "10", "-j", "1"]
+    monkeypatch.setattr(sys, "argv", [*words, "--net", "pedestrians"])
+    script("search/score").main()
+    first, *_, last = capsys.readouterr().out.splitlines()
+    assert first.split() == ["driver", "portfolio", "timing"]
+    assert last.startswith("timing: ")
+    assert "of 1 trials failed a faulty driver" in last

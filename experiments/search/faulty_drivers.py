@@ -1,10 +1,10 @@
 """Faulty drivers: a careful controller, and variants of it with one fault each.
 
 The careful driver decides in every timestep. It yields to everybody on the road whose course meets
-its own, or who is within a yard of its way, and stops before them. ``FAULTS`` lists the variants;
-each is a class of this module, so that ``--ego experiments/search/drivers.py`` is not needed:
+its own, or who is within a metre of its way, and stops before them. ``FAULTS`` lists the variants;
+each is a class of this module::
 
-    PYTHONPATH=experiments/search cavsumo run --net crossing --ego drivers:Careful
+    PYTHONPATH=experiments/search cavsumo search --ego faulty_drivers:TrustsTheLeaving
 """
 
 from __future__ import annotations
