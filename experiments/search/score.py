@@ -2,8 +2,8 @@
 
     python experiments/search/score.py --method portfolio --method timing --seeds 3
 
-Every driver of ``faulty_drivers.py`` is tested on its own, without traffic, by so many episodes; a search
-begins anew for each. The careful driver must not be failed by anybody.
+Every driver of ``faulty_drivers.py`` is tested on its own, without traffic, by so many episodes; a
+search begins anew for each. The careful driver must not be failed by anybody.
 """
 
 from __future__ import annotations
