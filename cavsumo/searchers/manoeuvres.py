@@ -17,8 +17,8 @@ from cavsumo.searchers.space import NAMES, Point, Space
 Range = tuple[float, float]
 STRAIGHT: Range = (0.45, 0.55)
 THROUGH: Range = (0.98, 1.0)
-LATE: Range = (0.1, 0.35)  # as the ego can hardly brake any more
-EARLY: Range = (0.3, 1.0)
+LATE: Range = (0.15, 0.5)  # as an ego that did not react before could hardly stop
+EARLY: Range = (0.2, 1.0)
 
 # For each manoeuvre the ranges of some numbers of ``space.NAMES``.
 MANOEUVRES: Mapping[str, Mapping[str, Range]] = {
@@ -35,7 +35,7 @@ MANOEUVRES: Mapping[str, Mapping[str, Range]] = {
         "heading_3": STRAIGHT,
     },
     "turns back": {
-        "zone": (0.2, 1.0), "depth": (0.6, 0.97), "resume": (0.0, 0.3), "heading_2": (0.85, 1.0),
+        "zone": EARLY, "depth": (0.6, 0.97), "resume": (0.0, 0.3), "heading_2": (0.85, 1.0),
         "length_2": (0.3, 1.0), "heading_3": (0.9, 1.0),
     },
     "turns in": {
