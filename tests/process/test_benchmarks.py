@@ -311,6 +311,14 @@ def test_speed(play: Play) -> None:
         assert len(others) == 6  # alone, whole, command, each with its ratio
 
 
+def test_suite_drivers(play: Play) -> None:
+    """Two drivers through one case."""
+    words = ["--ego", "constant", "--ego", "sumo:IDM/0", "--only", "CPNA/30/50", "-j", "1"]
+    _, first, second, _ = play("suite_drivers", *words).splitlines()
+    assert first.split()[:4] == ["constant", "0", "of", "1"]
+    assert second.split()[:4] == ["sumo:IDM/0", "1", "of", "1"]
+
+
 def test_ssm(play: Play) -> None:
     """It has no size: all encounters."""
     assert len(play("ssm").splitlines()) > 3
