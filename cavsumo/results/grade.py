@@ -32,8 +32,6 @@ if TYPE_CHECKING:
 INVALID_GRADE = -5.0
 MOST_S = 10.0  # a larger margin counts as this one, and so does a time that is not known
 SLOWEST_MPS = 1.0  # a slower ego counts as so fast
-# A driver who takes 1.15 s to react and 0.6 s to brake fully with 0.774 g (``reference.human``).
-REACTION_S, FULL_MPS2 = 1.15 + 0.3, 0.774 * 9.80665
 
 
 def grade(episode: Episode, avoidability: Avoidability | None) -> float:
@@ -81,7 +79,15 @@ def _short(avoidability: Avoidability) -> float:
 
 
 def _late(episode: Episode) -> float:
-    """How much earlier a body that came too late had to come for a human driver to stop [s]."""
+    """How much earlier a body that came too late had to come for a human driver to stop [s].
+
+    That driver loses as much speed as if it braked fully after its delay and half of the rise.
+    """
+    # The columns, which need this file, are read where nothing heavy may be imported.
+    from cavsumo.egos.reference.encounter import EVALUATION_S
+    from cavsumo.egos.reference.human import DELAY_S, FULL_MPS2, RISE_S
+
+    reaction = EVALUATION_S + DELAY_S + RISE_S / 2
     v, apart = episode.judgement.ego_speed or 0.0, episode.contacts.min_gap
     left = apart / v if v > 0.0 and math.isfinite(apart) else 0.0
-    return max(0.0, v / (2.0 * FULL_MPS2) + REACTION_S - left)
+    return max(0.0, v / (2.0 * FULL_MPS2) + reaction - left)
