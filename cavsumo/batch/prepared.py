@@ -34,7 +34,7 @@ from cavsumo.network.traffic import Volume
 from cavsumo.network.traffic_lights import Pace
 from cavsumo.results.present import input_files
 from cavsumo.results.provenance import checksums, traffic_checksum, unequal, versions
-from cavsumo.searchers.space import space_of
+from cavsumo.searchers.space import Space, space_of
 from cavsumo.suites.cases import case_plan, case_plans, suite_inputs
 from cavsumo.sumo.options import OPTIONS
 
@@ -79,6 +79,12 @@ class PreparedBatch:
         """The files that are kept with the results, by their checksums: all but programs."""
         found, sums = input_files(self.plan), self.checksums
         return {sums[name]: file for name, file in found.items() if name in sums}
+
+    @cached_property
+    def space(self) -> Space:
+        """The tests from which searchers choose; raises NetworkError where it holds no start."""
+        scenario = self.plan.scenario
+        return space_of(self.site, kind_named(scenario.kind), teams(scenario))
 
     @cached_property
     def packed(self) -> bytes:
@@ -132,7 +138,8 @@ class PreparedBatch:
     def without(self, outputs: Collection[str]) -> PreparedBatch:
         """The same batch, without some files as inputs."""
         kept = {name: sum for name, sum in self.checksums.items() if name not in outputs}
-        return dataclasses.replace(self, checksums=kept)
+        same = len(kept) == len(self.checksums)
+        return self if same else dataclasses.replace(self, checksums=kept)
 
 
 def _unpacked(packed: bytes) -> PreparedBatch:
@@ -172,7 +179,10 @@ def _prepared(plan: BatchPlan, ego: Ego | None) -> PreparedBatch:
     site = _site(plan, kind, ego, cast)
     objects = objects_among([*plan.cast.values(), scenario.ego, *scenario.assertions])
     where = str(Path.cwd()), _checksums(plan, cast), versions()
-    return PreparedBatch(plan, cast, site, *where, objects=objects)
+    prepared = PreparedBatch(plan, cast, site, *where, objects=objects)
+    if cast.searchers:
+        _ = prepared.space  # one without a start is refused
+    return prepared
 
 
 def prepare(plan: BatchPlan, ego: Ego | None = None) -> PreparedBatch:
@@ -224,8 +234,6 @@ def _site(plan: BatchPlan, kind: Kind, ego: Ego, cast: Cast) -> Site:
     if site.approaches:  # missing room must be found before the first episode
         kinds, rng = [kind] * scenario.testers, np.random.default_rng(plan.seed)
         site.draw(kinds, ego.kind, scenario.start_speed, rng)
-    if cast.searchers:
-        space_of(site, kind, teams(scenario))  # a space without a start is refused
     return site
 
 

@@ -19,7 +19,8 @@ from cavsumo.results.grade import INVALID_GRADE, grade
 from cavsumo.searchers.manoeuvres import MANOEUVRES, ManoeuvreSearch
 from cavsumo.searchers.methods import SEARCHERS, searcher_of
 from cavsumo.searchers.protocol import GENERATION, PlayedPoint
-from cavsumo.searchers.space import NAMES, Point, Space, programme, space_of
+from cavsumo.searchers.space import Point, Space, space_of
+from cavsumo.searchers.walks import Walks, walk_of
 from cavsumo.searchers.words import in_common
 from cavsumo.simulation.avoidability import Avoidability
 
@@ -33,11 +34,11 @@ def space(staged: Callable[..., tuple[BatchPlan, Site]]) -> Space:
 def test_a_place_is_beside_the_path(space: Space) -> None:
     """From the right first, each in the order in which the ego comes there."""
     for left in (False, True):
-        along = [place.along for place in space.places if place.left is left]
+        along = [place.along for place in space.movements.places if place.left is left]
         assert len(along) > 50
         assert along == sorted(along)
     path = space.site.route.path
-    for place in space.places:
+    for place in space.movements.places:
         assert (path.project(place.start.x, place.start.y).lateral > 0.0) is place.left
 
 
@@ -47,7 +48,7 @@ def test_a_point_is_starts_and_programmes(space: Space) -> None:
     first, second = space.memories(point)
     assert len(first["starts"]) == len(second["starts"]) == 1
     assert first["programmes"] == second["programmes"]
-    assert len(first["programmes"][0]) == len(NAMES)
+    assert len(first["programmes"][0]) == len(Walks.names)
     (x, y), (u, v) = (memory["starts"][0][:2] for memory in (first, second))
     assert math.dist((x, y), (u, v)) > 1.2  # the place was taken
     point[-1] = 0.75
@@ -55,11 +56,23 @@ def test_a_point_is_starts_and_programmes(space: Space) -> None:
     assert len(space.seen(point)) == 1
 
 
+def test_every_number_of_a_point_has_a_body_and_a_name(space: Space) -> None:
+    """No two numbers have the same, and a number is found by them."""
+    assert len(set(space.coordinates)) == space.dimension
+    assert {c.body for c in space.coordinates} == {0, 1}
+    point = np.arange(space.dimension) / space.dimension
+    for i, (body, name) in enumerate(space.coordinates):
+        assert space.share(point, body, name) == point[i]
+    with pytest.raises(KeyError):
+        space.index(0, "presence")  # the first body always takes part
+
+
 def test_a_programme_stays_within_natural_limits() -> None:
     """At the corners of the cube, and the pause ends by time or by the place of the ego."""
     rng = np.random.default_rng(1)
-    for numbers in [[0.0] * 10, [1.0] * 10, *rng.random((50, 10)).tolist()]:
-        walk = programme(numbers, PEDESTRIAN)
+    size = len(Walks.names)
+    for numbers in [[0.0] * size, [1.0] * size, *rng.random((50, size)).tolist()]:
+        walk = walk_of(dict(zip(Walks.names, numbers, strict=True)), PEDESTRIAN)
         for speed in (walk.speed, walk.speed_2):
             assert 0.3 <= speed <= PEDESTRIAN.v_max
         assert abs(walk.heading) < math.pi / 2
@@ -107,8 +120,8 @@ def test_what_was_good_is_looked_at_more_closely(space: Space, method: str) -> N
 
 def test_every_manoeuvre_is_within_the_space(space: Space) -> None:
     """Its numbers are numbers of the space, in [0, 1], and a round has all of them."""
-    for ranges in MANOEUVRES.values():
-        assert set(ranges) <= set(NAMES)
+    for ranges in MANOEUVRES[space.movements.name].values():
+        assert set(ranges) <= set(space.movements.names)
         assert all(0.0 <= low <= high <= 1.0 for low, high in ranges.values())
     drawn = [p for _ in range(2) for p in ManoeuvreSearch(space, np.random.default_rng(1)).ask()]
     assert all((point >= 0.0).all() and (point <= 1.0).all() for point in drawn)
@@ -116,7 +129,7 @@ def test_every_manoeuvre_is_within_the_space(space: Space) -> None:
 
 def test_features_that_most_failures_share() -> None:
     """Side, speed, angle, manner."""
-    walk = programme([0.5] * 10, PEDESTRIAN)
+    walk = walk_of(dict.fromkeys(Walks.names, 0.5), PEDESTRIAN)
     slow = walk._replace(speed=0.5, heading=-1.0, depth=3.0)
     place: Any = SimpleNamespace(left=True)
     assert in_common([(place, slow), (place, slow)]) == (
