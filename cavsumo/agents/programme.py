@@ -8,10 +8,10 @@ directions are relative to the ego's path, so a programme makes sense on any roa
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from typing import NamedTuple
 
 from cavsumo.agents.avoidance import Avoidance
+from cavsumo.agents.legs import WalkLeg, walk_time
 from cavsumo.agents.planning.coordinates import meeting
 from cavsumo.agents.triggers import MAX_DECEL, REACTION_TIME
 from cavsumo.agents.walking import ApproachKerb, stopping_speed, walk
@@ -142,8 +142,8 @@ class ProgrammedWalk:
         assert self._met is not None
         met = self._met
         left = max(0.0, met.strip - met.way.progress(state.x, state.y))
-        entry, shift = _entry(programme, left, state.body.kind)
-        return self._gap(snapshot, shift) - snapshot.ego.v * (entry + self.scene.dt) <= _zone_m(
+        entry, shift = entry_of(programme, left, state.body.kind)
+        return self._gap(snapshot, shift) - snapshot.ego.v * (entry + self.scene.dt) <= zone_m(
             programme.zone, snapshot.ego.v
         )
 
@@ -158,9 +158,9 @@ class ProgrammedWalk:
         assert met is not None
         v, along = snapshot.ego.v, self.scene.ego_path.project(state.x, state.y).along
         left = max(0.0, met.strip - met.way.progress(state.x, state.y))
-        entry, shift = _walked(_last_legs(programme), left, state.body.kind) or (0.0, 0.0)
+        entry, shift = walk_time(_last_legs(programme), left, state.body.kind) or (0.0, 0.0)
         gap = self._gap(snapshot, along - met.along + shift) - v * entry
-        return gap <= _zone_m(programme.resume, v)
+        return gap <= zone_m(programme.resume, v)
 
     def _gap(self, snapshot: Snapshot, shift: float) -> float:
         """Distance from the ego's front to the body, so far beyond its meeting point [m]."""
@@ -169,70 +169,28 @@ class ProgrammedWalk:
         return self._met.along + shift - half - self.scene.ego_progress(snapshot)
 
 
-class _Leg(NamedTuple):
-    """A straight leg: its speed [m/s], heading [rad], length [m], and whether it ends at rest."""
-
-    speed: float
-    heading: float
-    length: float
-    stops: bool = False
-
-
-def _entry(programme: WalkProgramme, left: float, kind: Kind) -> tuple[float, float]:
+def entry_of(programme: WalkProgramme, left: float, kind: Kind) -> tuple[float, float]:
     """When a body so far from the ego's strip would enter it by its programme, and where [s, m].
 
     The place is relative to where it would enter straight across, along the ego's path. A body that
     waits for the ego before the strip, or never enters it, counts as if its first leg went on.
     """
-    first = _Leg(programme.speed, programme.heading, math.inf)
+    first = WalkLeg(programme.speed, programme.heading, math.inf)
     if programme.depth < 0.0 and programme.resume is None:
         to_go = max(0.0, left + programme.depth)
         short = first._replace(length=to_go / math.cos(programme.heading), stops=programme.stops)
-        walked = _walked([short, *_last_legs(programme)], left, kind)
-        if walked is not None:
-            return programme.pause + walked[0], walked[1]
-    return _walked([first], left, kind) or (0.0, 0.0)
+        entered = walk_time([short, *_last_legs(programme)], left, kind)
+        if entered is not None:
+            return programme.pause + entered[0], entered[1]
+    return walk_time([first], left, kind) or (0.0, 0.0)
 
 
-def _last_legs(programme: WalkProgramme) -> list[_Leg]:
+def _last_legs(programme: WalkProgramme) -> list[WalkLeg]:
     """The legs after the pause."""
-    second = _Leg(programme.speed_2, programme.heading_2, programme.length_2)
-    return [second, _Leg(programme.speed_2, programme.heading_3, math.inf)]
+    second = WalkLeg(programme.speed_2, programme.heading_2, programme.length_2)
+    return [second, WalkLeg(programme.speed_2, programme.heading_3, math.inf)]
 
 
-def _walked(legs: Sequence[_Leg], left: float, kind: Kind) -> tuple[float, float] | None:
-    """Time until so much of the way across is behind, and the way along meanwhile [s, m].
-
-    The body begins at rest, and brakes as hard as it gains speed; None if it never gets there.
-    """
-    time = shift = v = 0.0
-    for leg in legs:
-        towards = math.cos(leg.heading)
-        if towards > 1e-3 and leg.length * towards >= left:
-            way = left / towards
-            return time + _spent(way, v, leg.speed, kind), shift + way * math.sin(leg.heading)
-        if not math.isfinite(leg.length):
-            return None
-        left -= leg.length * towards
-        shift += leg.length * math.sin(leg.heading)
-        speed = (
-            min(leg.speed, math.sqrt(leg.length * kind.throttle_max)) if leg.stops else leg.speed
-        )
-        time += _spent(leg.length, v, speed, kind) if speed > 0.0 else 0.0
-        time += leg.stops * speed / (2.0 * kind.throttle_max)
-        v = 0.0 if leg.stops else speed
-    return None
-
-
-def _spent(way: float, v: float, speed: float, kind: Kind) -> float:
-    """Time to walk so far from one speed to another one [s]."""
-    a = math.copysign(kind.throttle_max, speed - v)
-    changing = (speed - v) * (speed + v) / (2.0 * a)
-    if changing >= way:
-        return (math.sqrt(max(0.0, v * v + 2.0 * a * way)) - v) / a
-    return (speed - v) / a + (way - changing) / speed
-
-
-def _zone_m(zone: float, v: float) -> float:
+def zone_m(zone: float, v: float) -> float:
     """A zone as a distance ahead of an ego of a speed [m]."""
     return 0.5 * v * v / MAX_DECEL + zone * REACTION_TIME * v

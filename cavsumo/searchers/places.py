@@ -16,11 +16,13 @@ class Place(NamedTuple):
         start: there.
         left: whether it comes from the left of the ego.
         along: where its way meets the ego's path [m].
+        away: how far it is from the strip that the ego sweeps [m].
     """
 
     start: Start
     left: bool
     along: float
+    away: float = 0.0
 
 
 def within(bounds: tuple[float, float], share: float) -> float:

@@ -64,6 +64,9 @@ class Movements(Protocol):
     @property
     def manner(self) -> tuple[str, ...]: ...
 
+    def suited(self, shares: Mapping[str, float]) -> tuple[Place, ...]:
+        """The places that suit the other numbers of a body, in their order; there is always one."""
+
     def realised(self, place: Place, shares: Mapping[str, float]) -> tuple[Place, Programme]:
         """Where a body starts at one of the places, and its programme, by its numbers."""
 
@@ -159,8 +162,8 @@ class Space:
         return found
 
     def _free(self, shares: Mapping[str, float], taken: Sequence[Place]) -> tuple[Place, Programme]:
-        """A body at the place at a share of all, or at the next one apart from those taken."""
-        places = self.movements.places
+        """A body at the place at a share of those that suit it, or at the next one that is free."""
+        places = self.movements.suited(shares)
         first = min(int(shares["place"] * len(places)), len(places) - 1)
         for i in range(len(places)):
             place, programme = self.movements.realised(places[(first + i) % len(places)], shares)

@@ -13,6 +13,7 @@ import pytest
 
 from cavsumo.assertions.judgement import HELD, NOT_TRIGGERED, UNFAIR, VIOLATED, Judgement
 from cavsumo.model.bodies import PEDESTRIAN
+from cavsumo.model.carriageway import Limit
 from cavsumo.model.scenario import BatchPlan
 from cavsumo.network.site import Site
 from cavsumo.results.grade import INVALID_GRADE, grade
@@ -65,6 +66,21 @@ def test_every_number_of_a_point_has_a_body_and_a_name(space: Space) -> None:
         assert space.share(point, body, name) == point[i]
     with pytest.raises(KeyError):
         space.index(0, "presence")  # the first body always takes part
+
+
+def test_a_slow_body_starts_where_it_is_in_time(space: Space) -> None:
+    """The longer it walks to the ego's strip, the farther along the path; all if nowhere."""
+    quick = {name: 0.5 for name in space.movements.names} | {"speed": 1.0, "depth": 1.0}
+    slow = quick | {"speed": 0.5}
+    firsts = []
+    for shares in (quick, slow):
+        suited = space.movements.suited(shares)
+        assert set(suited) < set(space.movements.places)
+        firsts.append({left: min(p.along for p in suited if p.left is left) for left in (0, 1)})
+    assert all(firsts[0][left] + 10.0 < firsts[1][left] for left in (0, 1))
+    assert firsts[0][0] < firsts[0][1]  # from the left it is farther to the strip
+    never = dataclasses.replace(space.movements, limits=(Limit(0.0, 500.0),))  # type: ignore[type-var]
+    assert never.suited(quick) == space.movements.places
 
 
 def test_a_programme_stays_within_natural_limits() -> None:
