@@ -25,6 +25,8 @@ from cavsumo.searchers.walks import Walks, walk_of
 from cavsumo.searchers.words import in_common
 from cavsumo.simulation.avoidability import Avoidability
 
+SIDES = (False, True)  # from the right, from the left
+
 
 @pytest.fixture
 def space(staged: Callable[..., tuple[BatchPlan, Site]]) -> Space:
@@ -34,7 +36,7 @@ def space(staged: Callable[..., tuple[BatchPlan, Site]]) -> Space:
 
 def test_a_place_is_beside_the_path(space: Space) -> None:
     """From the right first, each in the order in which the ego comes there."""
-    for left in (False, True):
+    for left in SIDES:
         along = [place.along for place in space.movements.places if place.left is left]
         assert len(along) > 50
         assert along == sorted(along)
@@ -72,15 +74,19 @@ def test_a_slow_body_starts_where_it_is_in_time(space: Space) -> None:
     """The longer it walks to the ego's strip, the farther along the path; all if nowhere."""
     quick = {name: 0.5 for name in space.movements.names} | {"speed": 1.0, "depth": 1.0}
     slow = quick | {"speed": 0.5}
-    firsts = []
+    firsts: list[dict[bool, float]] = []
+
+    def limited(speed: float) -> Any:
+        movements: Any = space.movements
+        return dataclasses.replace(movements, limits=(Limit(0.0, speed),))
+
     for shares in (quick, slow):
-        suited = space.movements.suited(shares)
+        suited = limited(7.0).suited(shares)
         assert set(suited) < set(space.movements.places)
-        firsts.append({left: min(p.along for p in suited if p.left is left) for left in (0, 1)})
-    assert all(firsts[0][left] + 10.0 < firsts[1][left] for left in (0, 1))
-    assert firsts[0][0] < firsts[0][1]  # from the left it is farther to the strip
-    never = dataclasses.replace(space.movements, limits=(Limit(0.0, 500.0),))  # type: ignore[type-var]
-    assert never.suited(quick) == space.movements.places
+        firsts.append({left: min(p.along for p in suited if p.left is left) for left in SIDES})
+    assert all(firsts[0][left] + 5.0 < firsts[1][left] for left in SIDES)
+    assert firsts[0][False] < firsts[0][True]  # from the left it is farther to the strip
+    assert limited(500.0).suited(quick) == space.movements.places
 
 
 def test_a_programme_stays_within_natural_limits() -> None:
