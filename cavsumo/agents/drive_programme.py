@@ -9,6 +9,7 @@ stay within those of ordinary drivers, which are narrower than those of its kind
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from functools import partial
 from typing import NamedTuple
@@ -43,6 +44,10 @@ GENTLE_MPS2 = 1.0  # throttle without effort; with all of it driving.HASTE_MPS2
 SIDEWAYS_MPS2 = 5.0  # largest acceleration sideways: half of what dry tyres hold
 CHANGE_S = (1.8, 1.0)  # the pursued point of a change of lanes, without and with all effort
 NEAREST_M = 5.0  # that point is no nearer
+LATE_S = (
+    0.3  # a vehicle that would come so much later than its cue says drives up to the line first
+)
+AT_LINE_M = 1.0  # a vehicle so near to its line waits there
 ENDED_S = 3.0  # it drives lawfully so long after it went on
 
 
@@ -96,7 +101,7 @@ class Pause:
     def over(self, snapshot: Snapshot, reactions: EgoReactions, gap: float) -> bool:
         """Whether it goes on; the pause begins with the first question.
 
-        ``gap``: from the ego's front to the vehicle [m].
+        ``gap``: that the ego has left as they meet [m].
         """
         programme, time = self.programme, snapshot.time
         if self.begun is None:
@@ -149,11 +154,8 @@ class ProgrammedRun(Legs, Run):
             left = self.approach.enter + self._depth - self.course.place(state)[0]
             allowed = min(allowed, stopping_from(left - state.v * dt, 0.0, dt))
             self.stands = max(state.v, allowed) <= SLOW_MPS
+            self.course = self._then if self.stands else self.course
         return self.course.drive(state, allowed, gaining=self.gaining)
-
-    def go_on(self) -> None:
-        super().go_on()
-        self.course = self._then
 
 
 class ProgrammedBrake(Legs, Brake):
@@ -232,6 +234,7 @@ class ProgrammedDrive:
         )
         self._ego = EgoPrediction(scene, approach.ego_speed)
         self._reactions = EgoReactions()
+        self._approach, self._late = approach, False
         if programme is not None:
             self._pause = Pause(programme)
             cue = programme.cue
@@ -241,13 +244,15 @@ class ProgrammedDrive:
         """The next action."""
         driver, programme = self._driver, self.programme
         self._reactions.see(snapshot)
+        if snapshot.sees_ego:
+            self._ego.see(snapshot)
         if programme is None:
             return driver.idle(snapshot, state)
         if driver.active and driver.over(state):
             driver.end()
         due = driver.active or self._due(snapshot, state, programme)
         if not driver.active and not (due and driver.begin(state)):
-            return driver.idle(snapshot, state)
+            return driver.idle(snapshot, state, hurry=self._late)
         legs = driver.manoeuvre
         assert isinstance(legs, Legs)
         if legs.stands and not legs.second:
@@ -266,17 +271,30 @@ class ProgrammedDrive:
             return self._awaited.came(self._reactions, snapshot.time)
         assert self._driver.manoeuvre is not None
         assert not isinstance(programme.cue, str)
-        self._ego.see(snapshot)
         meeting = self._driver.manoeuvre.gap(self._ego, state)
         if meeting is None:
             return False
         gap, v = meeting
-        return gap <= zone_m(programme.cue, v) + v * programme.every / 2 and in_phase(
-            snapshot.time, programme.phase, programme.every, self.scene.dt
-        )
+        most, half = zone_m(programme.cue, v), programme.every / 2
+        self._late = gap < most - v * (LATE_S + half) and self._can_hurry(state)
+        in_time = gap <= most + v * half and not self._late
+        return in_time and in_phase(snapshot.time, programme.phase, programme.every, self.scene.dt)
+
+    def _can_hurry(self, state: BodyState) -> bool:
+        """Whether it has not yet come to where it waits, so that it can still gain time."""
+        approach = self._approach
+        here = self._driver.course.place(state)[0]
+        return math.isfinite(approach.wait) and here < approach.wait - AT_LINE_M
 
     def _gap(self, snapshot: Snapshot, state: BodyState) -> float:
-        """Distance from the ego's front to the vehicle along the ego's path [m]."""
+        """The gap that the ego has left as they meet if the vehicle goes on now [m].
+
+        Where it stands in the ego's way, that to the vehicle along the ego's path.
+        """
+        assert self._driver.manoeuvre is not None
+        meeting = self._driver.manoeuvre.gap(self._ego, state)
+        if isinstance(self._driver.manoeuvre, ProgrammedRun) and meeting is not None:
+            return meeting[0]
         here = self.scene.ego_path.project(state.x, state.y).along
         reach = extent(state, self.scene.ego_path.at(here)[2])[0]
         return here - reach - self.scene.ego.kind.length / 2 - self.scene.ego_progress(snapshot)

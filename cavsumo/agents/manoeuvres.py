@@ -223,8 +223,11 @@ class Driver:
         if beside and approach.path.length - approach.leave < SQUEEZE_M:
             self._run_out += approach.leave - approach.path.length
 
-    def idle(self, snapshot: Snapshot, state: BodyState) -> Action:
-        """Drive lawfully, or do nothing before it begins."""
+    def idle(self, snapshot: Snapshot, state: BodyState, *, hurry: bool = False) -> Action:
+        """Drive lawfully, or do nothing before it begins.
+
+        ``hurry``: drive up to where it waits without regard to when the ego will arrive.
+        """
         if self._noop and not self._begun:
             return NOOP
         here, dt = self.course.place(state)[0], self.scene.dt
@@ -232,7 +235,7 @@ class Driver:
         allowed = self.course.room(state, everybody(snapshot, state))
         if not self._begun and here < self.approach.enter:
             left = min(left, self.approach.wait - here - state.v * dt)
-            allowed = min(allowed, self._unhurried(snapshot, here))
+            allowed = allowed if hurry else min(allowed, self._unhurried(snapshot, here))
         return self.course.drive(state, min(allowed, stopping_from(left, 0.0, dt)))
 
     def _unhurried(self, snapshot: Snapshot, here: float) -> float:

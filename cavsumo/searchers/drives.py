@@ -27,7 +27,9 @@ from cavsumo.searchers.places import (
 )
 
 LEADS = 16  # places on an approach: how much earlier than the ego a vehicle arrives
+MOST_LEAD_S = 6.0  # one that arrives early waits at its line
 SLOWEST_MPS = 1.0
+STOPPING_ZONES = (-0.8, 6.0)  # of one that stops, and so meets the ego later
 DEPTHS_M = (-3.0, 4.0)
 THROUGH = 0.6  # share of the number "depth" from which on a vehicle does not stop
 ONCOMING_RAD, ALONG_RAD = math.radians(135.0), math.radians(45.0)
@@ -89,7 +91,7 @@ def drive_of(shares: Mapping[str, float], kind: Kind) -> DriveProgramme:
     pause, resume = pause_of(shares["resume"])
     depth, speeds = shares["depth"], (SLOWEST_MPS, kind.v_max)
     return DriveProgramme(
-        cue=within(ZONES, shares["zone"]),
+        cue=within(ZONES if depth >= THROUGH else STOPPING_ZONES, shares["zone"]),
         speed=within(speeds, shares["speed"]),
         effort=shares["effort"],
         depth=None if depth >= THROUGH else within(DEPTHS_M, depth / THROUGH),
@@ -123,8 +125,9 @@ def _places(approach: Approach, ego_path: Path, kind: Kind, ego: Box) -> Iterato
         return
     along = approach.ego_enter if meets else 0.0
     pace = sum(pace_range(approach)) / 2
+    earliest, latest = lead_range(approach)
     for i in range(LEADS):
-        lead = within(lead_range(approach), i / (LEADS - 1))
+        lead = within((earliest, MOST_LEAD_S if meets else latest), i / (LEADS - 1))
         start = vehicle_start(approach, kind, ego.length, pace, lead)
         yield Place(start, _whence(approach, ego_path), along, lead)
 

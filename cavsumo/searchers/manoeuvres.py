@@ -55,7 +55,6 @@ DRIVES: Mapping[str, Mapping[str, Range]] = {
     "hesitates": {"zone": EARLY, "depth": (0.1, 0.28), "resume": (0.1, 0.4)},
     "waits for the ego": {"zone": EARLY, "depth": (0.1, 0.28), "resume": (0.43, 0.58)},
     "goes on as the ego brakes": {"zone": EARLY, "depth": (0.1, 0.28), "resume": (0.7, 0.85)},
-    "goes on as the ego does": {"zone": EARLY, "depth": (0.1, 0.28), "resume": (0.85, 1.0)},
 }
 # By the name of the movements.
 MANOEUVRES: Mapping[str, Mapping[str, Mapping[str, Range]]] = {"walks": WALKS, "drives": DRIVES}
