@@ -147,10 +147,9 @@ class CutIn(Manoeuvre):
 
     def begin(self, state: BodyState) -> None:
         assert self.approach.into is not None
-        kind, top = state.body.kind, max(state.v, CREEPING_MPS)
-        self.course = Course(self.approach.into, kind, self.scene.dt, top)
-        self.slowed = SLOWED * top
-        self.arrived = False
+        top = max(state.v, CREEPING_MPS)
+        self.course = Course(self.approach.into, state.body.kind, self.scene.dt, top)
+        self.slowed, self.arrived = SLOWED * top, False
 
     def act(self, state: BodyState, others: Iterator[BodyState]) -> Action:
         self.arrived = self.arrived or abs(self.course.place(state)[1]) < ARRIVED_M
@@ -224,10 +223,7 @@ class Driver:
             self._run_out += approach.leave - approach.path.length
 
     def idle(self, snapshot: Snapshot, state: BodyState, *, hurry: bool = False) -> Action:
-        """Drive lawfully, or do nothing before it begins.
-
-        ``hurry``: drive up to where it waits without regard to when the ego will arrive.
-        """
+        """Drive lawfully, perhaps in a hurry up to where it waits; or do nothing yet."""
         if self._noop and not self._begun:
             return NOOP
         here, dt = self.course.place(state)[0], self.scene.dt
@@ -235,7 +231,7 @@ class Driver:
         allowed = self.course.room(state, everybody(snapshot, state))
         if not self._begun and here < self.approach.enter:
             left = min(left, self.approach.wait - here - state.v * dt)
-            allowed = allowed if hurry else min(allowed, self._unhurried(snapshot, here))
+            allowed = min(allowed, math.inf if hurry else self._unhurried(snapshot, here))
         return self.course.drive(state, min(allowed, stopping_from(left, 0.0, dt)))
 
     def _unhurried(self, snapshot: Snapshot, here: float) -> float:

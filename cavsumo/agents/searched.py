@@ -12,9 +12,10 @@ from typing import Any, ClassVar
 import numpy as np
 
 from cavsumo.agents.base import AGENTS, Agent
-from cavsumo.agents.drive_programme import DriveProgramme, ProgrammedDrive
+from cavsumo.agents.drive_programme import ProgrammedDrive
 from cavsumo.agents.names import SEARCH, SEARCH_METHODS
 from cavsumo.agents.programme import ProgrammedWalk, WalkProgramme
+from cavsumo.agents.programmed_manoeuvres import DriveProgramme
 from cavsumo.agents.recorded import start_of
 from cavsumo.model.bodies import Action
 from cavsumo.model.checks import choice

@@ -7,7 +7,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import ClassVar
 
-from cavsumo.agents.drive_programme import DriveProgramme
+from cavsumo.agents.programmed_manoeuvres import DriveProgramme
 from cavsumo.errors import NetworkError
 from cavsumo.model.bodies import Kind
 from cavsumo.model.carriageway import Approach
