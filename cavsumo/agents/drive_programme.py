@@ -18,7 +18,7 @@ from cavsumo.agents.programmed_manoeuvres import (
     ProgrammedRun,
     programmed_manoeuvre,
 )
-from cavsumo.model.bodies import Action
+from cavsumo.model.bodies import Action, clamped
 from cavsumo.model.scene import Scene
 from cavsumo.model.snapshot import BodyState, Snapshot
 
@@ -96,8 +96,8 @@ class ProgrammedDrive:
             if self._pause.over(snapshot, self._reactions, gap):
                 legs.go_on()
         wanted = driver.act(snapshot, state)
-        throttle = max(-programme.braking, wanted.throttle)
-        return within_turn(wanted._replace(throttle=throttle), state, SIDEWAYS_MPS2)
+        natural = wanted._replace(throttle=max(-programme.braking, wanted.throttle))
+        return within_turn(clamped(natural, state.body.kind), state, SIDEWAYS_MPS2)
 
     def _due(self, snapshot: Snapshot, state: BodyState, programme: DriveProgramme) -> bool:
         """Whether the vehicle begins now."""

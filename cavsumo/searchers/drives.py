@@ -20,7 +20,6 @@ from cavsumo.searchers.places import (
     FROM_LEFT,
     FROM_RIGHT,
     NEAREST_M,
-    ZONES,
     Place,
     pause_of,
     within,
@@ -29,7 +28,9 @@ from cavsumo.searchers.places import (
 LEADS = 16  # places on an approach: how much earlier than the ego a vehicle arrives
 MOST_LEAD_S = 6.0  # one that arrives early waits at its line
 SLOWEST_MPS = 1.0
-STOPPING_ZONES = (-0.8, 6.0)  # of one that stops, and so meets the ego later
+# Where an ego that does not react would be as a vehicle comes into its way; one that stops first
+# comes later.
+ZONES, STOPPING_ZONES = (-0.8, 4.0), (-0.8, 6.0)
 DEPTHS_M = (-3.0, 4.0)
 THROUGH = 0.6  # share of the number "depth" from which on a vehicle does not stop
 ONCOMING_RAD, ALONG_RAD = math.radians(135.0), math.radians(45.0)

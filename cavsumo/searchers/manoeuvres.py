@@ -48,8 +48,8 @@ WALKS: Mapping[str, Mapping[str, Range]] = {
     "stands": {"zone": EARLY, "depth": (0.35, 0.8), "resume": (0.32, 0.4)},
 }  # fmt: skip
 DRIVES: Mapping[str, Mapping[str, Range]] = {
-    "does not stop": {"zone": LATE, "speed": (0.5, 1.0), "effort": (0.5, 1.0), "depth": ON},
-    "does not stop, slowly": {"zone": LATE, "speed": (0.0, 0.4), "depth": ON},
+    "does not stop": {"zone": (0.1, 0.6), "speed": (0.5, 1.0), "effort": (0.5, 1.0), "depth": ON},
+    "does not stop, slowly": {"zone": (0.1, 0.6), "speed": (0.0, 0.4), "depth": ON},
     "stops in the way": {"zone": EARLY, "depth": (0.28, 0.55), "resume": (0.3, 0.4)},
     "creeps": {"zone": EARLY, "speed": (0.0, 0.3), "depth": (0.15, 0.3), "resume": (0.3, 0.4)},
     "hesitates": {"zone": EARLY, "depth": (0.1, 0.28), "resume": (0.1, 0.4)},

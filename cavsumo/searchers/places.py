@@ -8,7 +8,6 @@ from cavsumo.agents.cues import BRAKES, SPEEDS_UP, Cue
 from cavsumo.model.carriageway import Start
 
 NEAREST_M = 12.0  # nearer to where the ego enters nobody can meet it in time
-ZONES = (-0.8, 1.6)  # where an ego that does not react would be as a body comes into its way
 RESUMED = (-0.5, 2.5)  # where it is as a body goes on
 LONGEST_PAUSE_S = 2.0
 LONGEST_DELAY_S = 1.5  # from a reaction of the ego to a body that begins

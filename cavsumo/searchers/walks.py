@@ -17,7 +17,6 @@ from cavsumo.searchers.places import (
     FROM_LEFT,
     FROM_RIGHT,
     NEAREST_M,
-    ZONES,
     Place,
     pause_of,
     within,
@@ -26,6 +25,7 @@ from cavsumo.searchers.places import (
 PLACE_M = 0.5  # distance of two places along a pavement
 SLOWEST_MPS = 0.3
 OBLIQUE_RAD = math.radians(60.0)  # of the first leg, to either side
+ZONES = (-0.8, 1.6)  # where an ego that does not react would be as a body comes into its way
 DEPTHS_M = (-1.5, 3.0)
 LONGEST_M = 5.0  # of the second leg
 
