@@ -12,13 +12,17 @@ from typing import Any, ClassVar
 import numpy as np
 
 from cavsumo.agents.base import AGENTS, Agent
+from cavsumo.agents.drive_programme import ProgrammedDrive
 from cavsumo.agents.names import SEARCH, SEARCH_METHODS
 from cavsumo.agents.programme import ProgrammedWalk, WalkProgramme
+from cavsumo.agents.programmed_manoeuvres import DriveProgramme
 from cavsumo.agents.recorded import start_of
 from cavsumo.model.bodies import Action
 from cavsumo.model.checks import choice
 from cavsumo.model.scene import Scene
 from cavsumo.model.snapshot import Snapshot
+
+Programme = WalkProgramme | DriveProgramme
 
 
 @AGENTS.register(SEARCH)
@@ -29,33 +33,48 @@ class SearchAgent(Agent):
         "method": f"how points are chosen: {', '.join(SEARCH_METHODS)} (docs/search.md)",
     }
     sees_background = False
-    drives = False
     searches = True
 
     def __init__(self, method: str = "portfolio") -> None:
         self.method = choice("method", method, SEARCH_METHODS)
-        self._programmes: list[WalkProgramme | None] = []
+        self._programmes: list[Programme | None] = []
 
     def reset(self, scene: Scene, owned: Sequence[int], rng: np.random.Generator) -> None:
         super().reset(scene, owned, rng)
         programmes = self._programmes or [None] * len(owned)
-        self._walks = [
-            ProgrammedWalk(scene, i, programme)
-            for i, programme in zip(owned, programmes, strict=True)
+        self._programmed = [
+            _programmed(scene, i, programme) for i, programme in zip(owned, programmes, strict=True)
         ]
 
     def choose_action(self, snapshot: Snapshot) -> tuple[Action, ...]:
         return tuple(
-            walk.action(snapshot, state)
-            for walk, state in zip(self._walks, self.own(snapshot), strict=True)
+            one.action(snapshot, state)
+            for one, state in zip(self._programmed, self.own(snapshot), strict=True)
         )
 
     def recall(self) -> Any:
         return {
             "starts": self.recorded_starts,
-            "programmes": [one and list(one) for one in self._programmes],
+            "programmes": [one and one._asdict() for one in self._programmes],
         }
 
     def remember(self, memory: Mapping[str, Any]) -> None:
         self.recorded_starts = [start_of(start) for start in memory["starts"]]
-        self._programmes = [one and WalkProgramme(*one) for one in memory["programmes"]]
+        self._programmes = [one and programme_of(one) for one in memory["programmes"]]
+
+
+def _programmed(
+    scene: Scene, index: int, programme: Programme | None
+) -> ProgrammedWalk | ProgrammedDrive:
+    """A body that follows a programme; None: it stands by."""
+    if scene.starts[index].approach is None:
+        assert not isinstance(programme, DriveProgramme)
+        return ProgrammedWalk(scene, index, programme)
+    assert not isinstance(programme, WalkProgramme)
+    return ProgrammedDrive(scene, index, programme)
+
+
+def programme_of(plain: Mapping[str, Any]) -> Programme:
+    """A programme from its fields; raises TypeError for others."""
+    made = DriveProgramme if "effort" in plain else WalkProgramme
+    return made(**plain)

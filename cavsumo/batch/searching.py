@@ -23,7 +23,7 @@ from cavsumo.results.rows import cell
 from cavsumo.searchers.methods import searcher_of
 from cavsumo.searchers.protocol import PlayedPoint
 from cavsumo.searchers.space import Point
-from cavsumo.searchers.words import in_common
+from cavsumo.searchers.words import Failure, in_common
 
 SPEED_BIN_MPS, PLACE_BIN_M = 2.0, 10.0  # failures within a bin are alike
 
@@ -71,6 +71,7 @@ class Searching:
         self.points: list[Point] = []
         self._generation: list[int] = []  # episodes of the points that were asked for last
         self._told: dict[int, PlayedPoint] = {}
+        self._testers: dict[int, int] = {}  # the body that the verdict of an episode names
         self._lasted: dict[int, float] = {}
         self._uniform: set[int] = set()
 
@@ -93,6 +94,7 @@ class Searching:
         if self.ready(run):
             number = self._number(run)
             self._told[number] = self._result(self.points[number], row)
+            self._testers[number] = _body(cell(row["tester"]))
             self._lasted[number] = float(cell(row["time_s"]) or 0.0)
 
     def facts(self) -> SearchFacts:
@@ -109,7 +111,7 @@ class Searching:
             failures=len(failed),
             distinct=len({self._told[n].kind for n in failed}),
             first=first,
-            words=in_common([self.space.seen(self.points[n])[0] for n in failed]),
+            words=in_common([self._failure(n) for n in failed], self.space.movements.kind.name),
             uniform=sum(n in self._uniform for n in numbers),
             covered=self.space.covered(played),
         )
@@ -135,14 +137,25 @@ class Searching:
         grade = float(text["grade"]) if text["grade"] else INVALID_GRADE
         failed = text["outcome"] == "violated" and text["avoidable"] != "0" and grade >= 0.0
         return PlayedPoint(
-            grade, failed, self._kind(point, text["tester"], grade) if failed else ()
+            grade, failed, self._kind(point, _body(text["tester"]), grade) if failed else ()
         )
 
-    def _kind(self, point: Point, tester: str, impact: float) -> tuple[object, ...]:
+    def _failure(self, number: int) -> Failure:
+        """The body that the ego failed in an episode."""
+        point, body = self.points[number], self._testers[number]
+        place, programme = self.space.played(point)[body]
+        others = len(self.space.seen(point)) - (programme is not None)
+        return Failure(place, programme, others)
+
+    def _kind(self, point: Point, body: int, impact: float) -> tuple[object, ...]:
         """Impact speed, side and place of a failure, by which failures are alike."""
-        number = int(tester.removeprefix("tester")) if tester.startswith("tester") else 0
-        place = self.space.place(point, number)
-        return impact // SPEED_BIN_MPS, place.left, place.along // PLACE_BIN_M
+        place = self.space.place(point, body)
+        return impact // SPEED_BIN_MPS, place.whence, place.along // PLACE_BIN_M
+
+
+def _body(tester: str) -> int:
+    """The number of the body that a row names; the first one if it names none of the testers."""
+    return int(tester.removeprefix("tester")) if tester.startswith("tester") else 0
 
 
 def searched(
