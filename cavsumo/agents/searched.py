@@ -17,8 +17,10 @@ from cavsumo.agents.names import SEARCH, SEARCH_METHODS
 from cavsumo.agents.programme import ProgrammedWalk, WalkProgramme
 from cavsumo.agents.programmed_manoeuvres import DriveProgramme
 from cavsumo.agents.recorded import start_of
+from cavsumo.agents.walking import throttle_to
 from cavsumo.model.bodies import Action
-from cavsumo.model.checks import choice
+from cavsumo.model.checks import choice, truth
+from cavsumo.model.left_behind import LeftBehind
 from cavsumo.model.scene import Scene
 from cavsumo.model.snapshot import Snapshot
 
@@ -31,13 +33,16 @@ class SearchAgent(Agent):
 
     PARAMETERS: ClassVar[Mapping[str, str]] = {
         "method": f"how points are chosen: {', '.join(SEARCH_METHODS)} (docs/search.md)",
+        "cut": "end an episode once the ego has left all bodies behind; false to play on",
     }
     sees_background = False
     searches = True
 
-    def __init__(self, method: str = "portfolio") -> None:
+    def __init__(self, method: str = "portfolio", cut: bool = True) -> None:
         self.method = choice("method", method, SEARCH_METHODS)
+        self.cut = truth("cut", cut)
         self._programmes: list[Programme | None] = []
+        self._fellows: Sequence[SearchAgent] = ()
 
     def reset(self, scene: Scene, owned: Sequence[int], rng: np.random.Generator) -> None:
         super().reset(scene, owned, rng)
@@ -45,12 +50,34 @@ class SearchAgent(Agent):
         self._programmed = [
             _programmed(scene, i, programme) for i, programme in zip(owned, programmes, strict=True)
         ]
+        self._behind, self._resting = LeftBehind(scene), False
 
     def choose_action(self, snapshot: Snapshot) -> tuple[Action, ...]:
+        states, dt = self.own(snapshot), self.scene.dt
+        self._resting = self._resting or (self.cut and self._left_behind(snapshot))
+        if self._resting:
+            return tuple(Action(throttle_to(state, 0.0, dt), 0.0) for state in states)
         return tuple(
-            one.action(snapshot, state)
-            for one, state in zip(self._programmed, self.own(snapshot), strict=True)
+            one.action(snapshot, state) for one, state in zip(self._programmed, states, strict=True)
         )
+
+    def rests(self) -> bool:
+        return self._resting
+
+    def _left_behind(self, snapshot: Snapshot) -> bool:
+        """Whether the ego has left behind all that any tester's programme still comes to."""
+        programmed = [one for agent in self._fellows or (self,) for one in agent._programmed]
+        return snapshot.sees_ego and all(
+            self._behind(snapshot, state, one.reach(snapshot, state))
+            for one in programmed
+            if (state := snapshot.testers[one.index])
+        )
+
+    @classmethod
+    def coordinate(cls, agents: Sequence[Agent], rng: np.random.Generator) -> None:
+        fellows = [agent for agent in agents if isinstance(agent, SearchAgent)]
+        for agent in fellows:
+            agent._fellows = fellows
 
     def recall(self) -> Any:
         return {

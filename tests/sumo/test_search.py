@@ -93,6 +93,24 @@ def test_the_summary_names_common_features(tmp_path: Path, capsys: Capture) -> N
     assert "of the 10 points drawn at random none failed, so at most 30.8% of the space" in said
 
 
+def test_an_episode_ends_when_nobody_can_meet_the_ego(tmp_path: Path, capsys: Capture) -> None:
+    """Outcomes and grades are those of the whole episodes; that the ego arrived is not known."""
+    files = tmp_path / "cut.csv", tmp_path / "whole.csv"
+    for file, words in zip(files, ([], ["--param", "cut=false"]), strict=True):
+        _search(file, "--method", "random", "--trace", "all", *words)
+    cut, whole = map(rows, files)
+    learned = "outcome", "verdicts", "avoidable", "impact_speed_mps", "trigger_time_s", "grade"
+    assert [[r[c] for c in learned] for r in cut] == [[r[c] for c in learned] for r in whole]
+    shorter = [i for i, r in enumerate(cut) if float(r["time_s"]) < float(whole[i]["time_s"])]
+    assert shorter
+    for i in shorter:
+        assert (cut[i]["arrived"], cut[i]["lost_s"], whole[i]["arrived"]) == ("", "", "1")
+    for words in ([], ["--playback"]):
+        capsys.readouterr()
+        assert main(["replay", str(files[0]), str(shorter[0]), *words]) == 0
+        assert "the same" in capsys.readouterr().out
+
+
 @pytest.mark.parametrize(
     ("words", "said"),
     [
