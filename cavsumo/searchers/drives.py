@@ -66,6 +66,10 @@ class Drives:
     }
     manner: ClassVar[tuple[str, ...]] = ("place", "speed", "depth")
 
+    def suited(self, shares: Mapping[str, float]) -> tuple[Place, ...]:
+        """All places: a vehicle that comes too early waits at its line."""
+        return self.places
+
     def realised(self, place: Place, shares: Mapping[str, float]) -> tuple[Place, DriveProgramme]:
         """The place with a start of its own pace, and the programme of the numbers."""
         approach = place.start.approach

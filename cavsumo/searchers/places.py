@@ -24,12 +24,14 @@ class Place(NamedTuple):
         whence: from where it comes, seen from the ego: "from the left", "ahead of the ego" ...
         along: where its way meets the ego's path; 0 for one ahead of the ego or beside it [m].
         lead: how much earlier than the ego a vehicle arrives there, or how far it is ahead [s].
+        away: how far a pedestrian is from the strip that the ego sweeps [m].
     """
 
     start: Start
     whence: str
     along: float
     lead: float = 0.0
+    away: float = 0.0
 
     @property
     def left(self) -> bool:

@@ -76,6 +76,9 @@ class Movements(Protocol):
     @property
     def manner(self) -> tuple[str, ...]: ...
 
+    def suited(self, shares: Mapping[str, float]) -> tuple[Place, ...]:
+        """The places that suit the other numbers of a body, in their order; there is always one."""
+
     def realised(self, place: Place, shares: Mapping[str, float]) -> tuple[Place, Programme]:
         """Where a body starts at one of the places, and its programme, by its numbers."""
 
@@ -172,7 +175,8 @@ class Space:
 
     def _first(self, point: Point) -> tuple[Place, Programme]:
         """The place and the programme of the first body."""
-        place, programme = self._free(self._shares(point, 0), self.movements.places, [])
+        shares = self._shares(point, 0)
+        place, programme = self._free(shares, self.movements.suited(shares), [])
         if not self.every:
             return place, programme
         phase = self.share(point, 0, "phase") * self.every
@@ -183,10 +187,10 @@ class Space:
     ) -> tuple[Place, Programme | None]:
         """The place and the programme of a further body."""
         shares, company = self._shares(point, body), self.share(point, body, "company")
-        places: Sequence[Place] = self.movements.places
+        places: Sequence[Place] = self.movements.suited(shares)
         reaction, zone = self.share(point, body, "reaction"), shares["zone"]
         if company >= TOGETHER:
-            places = [p for p in places if abs(p.along - taken[0].along) <= NEAR_M]
+            places = [p for p in self.movements.places if abs(p.along - taken[0].along) <= NEAR_M]
             moment = self.share(point, 0, "zone") + MOMENTS * (zone - 0.5)
             shares["zone"] = min(1.0, max(0.0, moment))
         place, programme = self._free(shares, places, taken)

@@ -7,10 +7,11 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import ClassVar
 
-from cavsumo.agents.programme import WalkProgramme
+from cavsumo.agents.cues import zone_m
+from cavsumo.agents.programme import WalkProgramme, entry_of
 from cavsumo.errors import NetworkError
-from cavsumo.model.bodies import Kind
-from cavsumo.model.carriageway import Start
+from cavsumo.model.bodies import CAR, Kind
+from cavsumo.model.carriageway import Limit, Start
 from cavsumo.network.pedestrian_starts import APART_M, starting_range
 from cavsumo.network.site import Site
 from cavsumo.searchers.places import (
@@ -36,6 +37,7 @@ class Walks:
 
     kind: Kind
     places: tuple[Place, ...]
+    limits: tuple[Limit, ...] = ()
 
     name: ClassVar[str] = "walks"
     meanings: ClassVar[Mapping[str, str]] = {
@@ -52,9 +54,25 @@ class Walks:
     }
     manner: ClassVar[tuple[str, ...]] = ("speed", "heading", "depth")
 
+    def suited(self, shares: Mapping[str, float]) -> tuple[Place, ...]:
+        """The places from which the programme of the numbers can be in time; all if none can.
+
+        The ego is expected to drive at the limit.
+        """
+        walk = walk_of(shares, self.kind)
+        return tuple(p for p in self.places if self._in_time(walk, p)) or self.places
+
     def realised(self, place: Place, shares: Mapping[str, float]) -> tuple[Place, WalkProgramme]:
         """The place as it is, and the programme of the numbers."""
         return place, walk_of(shares, self.kind)
+
+    def _in_time(self, walk: WalkProgramme, place: Place) -> bool:
+        """Whether the ego is still to come when a body has to step off for its programme."""
+        if isinstance(walk.cue, str):
+            return True
+        entry, shift = entry_of(walk, place.away, self.kind)
+        v = [0.0, *(one.speed for one in self.limits if one.along <= place.along)][-1]
+        return place.along + shift >= v * entry + zone_m(walk.cue, v)
 
     def fits(self, place: Place, others: Sequence[Place]) -> bool:
         """Whether a body can start at a place, apart from others."""
@@ -88,7 +106,7 @@ def walks_at(site: Site, kind: Kind) -> Walks:
             f"{site.net}: a search finds no place for a pedestrian whose way across meets the "
             f"ego's route {NEAREST_M:g} m or more from its beginning; choose another --ego-route"
         )
-    return Walks(kind, tuple(places))
+    return Walks(kind, tuple(places), site.limits)
 
 
 def _places(site: Site, kind: Kind) -> list[Place]:
@@ -102,7 +120,9 @@ def _places(site: Site, kind: Kind) -> list[Place]:
             met = site.route.path.meet(x, y, way.heading) if way else None
             if way is None or met is None or met[1] < NEAREST_M:
                 continue
+            strip = met[0] - (CAR.width + kind.length) / 2
             left = math.sin(site.route.path.at(met[1])[2] - way.heading) > 0.0
             start = Start(x, y, o, area.pavement, 0.0, True, area.walk)
-            found.append(Place(start, FROM_LEFT if left else FROM_RIGHT, met[1]))
+            side = FROM_LEFT if left else FROM_RIGHT
+            found.append(Place(start, side, met[1], away=max(0.0, strip)))
     return found

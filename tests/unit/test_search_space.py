@@ -16,7 +16,7 @@ from cavsumo.agents.searched import programme_of
 from cavsumo.assertions.judgement import HELD, NOT_TRIGGERED, UNFAIR, VIOLATED, Judgement
 from cavsumo.errors import NetworkError
 from cavsumo.model.bodies import CAR, PEDESTRIAN
-from cavsumo.model.carriageway import Start
+from cavsumo.model.carriageway import Limit, Start
 from cavsumo.model.geometry import Box, gap
 from cavsumo.model.scenario import BatchPlan
 from cavsumo.network.site import Site
@@ -31,6 +31,8 @@ from cavsumo.searchers.walks import Walks, walk_of
 from cavsumo.searchers.words import Failure, in_common
 from cavsumo.simulation.avoidability import Avoidability
 
+SIDES = (False, True)  # from the right, from the left
+
 
 @pytest.fixture
 def space(staged: Callable[..., tuple[BatchPlan, Site]]) -> Space:
@@ -40,7 +42,7 @@ def space(staged: Callable[..., tuple[BatchPlan, Site]]) -> Space:
 
 def test_a_place_is_beside_the_path(space: Space) -> None:
     """From the right first, each in the order in which the ego comes there."""
-    for left in (False, True):
+    for left in SIDES:
         along = [place.along for place in space.movements.places if place.left is left]
         assert len(along) > 50
         assert along == sorted(along)
@@ -72,6 +74,25 @@ def test_every_number_of_a_point_has_a_body_and_a_name(space: Space) -> None:
         assert space.share(point, body, name) == point[i]
     with pytest.raises(KeyError):
         space.index(0, "company")  # the first body always takes part
+
+
+def test_a_slow_body_starts_where_it_is_in_time(space: Space) -> None:
+    """The longer it walks to the ego's strip, the farther along the path; all if nowhere."""
+    quick = {name: 0.5 for name in space.movements.meanings} | {"speed": 1.0, "depth": 1.0}
+    slow = quick | {"speed": 0.5}
+    firsts: list[dict[bool, float]] = []
+
+    def limited(speed: float) -> Any:
+        movements: Any = space.movements
+        return dataclasses.replace(movements, limits=(Limit(0.0, speed),))
+
+    for shares in (quick, slow):
+        suited = limited(7.0).suited(shares)
+        assert set(suited) < set(space.movements.places)
+        firsts.append({left: min(p.along for p in suited if p.left is left) for left in SIDES})
+    assert all(firsts[0][left] + 5.0 < firsts[1][left] for left in SIDES)
+    assert firsts[0][False] < firsts[0][True]  # from the left it is farther to the strip
+    assert limited(500.0).suited(quick) == space.movements.places
 
 
 def test_a_programme_stays_within_natural_limits() -> None:
