@@ -23,8 +23,8 @@ Capture = pytest.CaptureFixture[str]
 RUNS = 24
 
 
-def _search(file: Path, *more: str, runs: int = RUNS) -> int:
-    words = ["search", "--net", "pedestrians", "--ego", "constant", "--runs", str(runs), "-q"]
+def _search(file: Path, *more: str, runs: int = RUNS, net: str = "pedestrians") -> int:
+    words = ["search", "--net", net, "--ego", "constant", "--runs", str(runs), "-q"]
     return main([*words, "-o", str(file), *more])
 
 
@@ -76,6 +76,23 @@ def test_a_point_is_replayed_from_its_trace_and_from_the_rows(
     assert _search(bare, "--trace", "none") == Exit.VIOLATED
     assert main(["replay", str(bare), run]) == 0
     assert "the same" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize("kind", ["car", "bicycle"])
+def test_vehicles_are_searched_and_replayed(kind: str, tmp_path: Path, capsys: Capture) -> None:
+    """With a second one; rows two at a time, and replays from trace and rows, are the same."""
+    one, both = (_folder(tmp_path / name) for name in ("one", "both"))
+    words = ["--kind", kind, "--testers", "2", "--exit-zero"]
+    assert _search(one, *words, runs=12, net="crossing") == 0
+    assert _search(both, *words, "-j", "2", "--trace", "none", runs=12, net="crossing") == 0
+    bare = [row | {"trace": ""} for row in rows(one)]
+    assert rows(both) == bare
+    failed = [row for row in rows(one) if row["outcome"] == "violated"]
+    assert any(row["avoidable"] == "1" for row in failed)
+    capsys.readouterr()
+    for file in (one, both):
+        assert main(["replay", str(file), failed[-1]["run"]]) == 0
+        assert "the same" in capsys.readouterr().out
 
 
 def test_the_summary_names_common_features(tmp_path: Path, capsys: Capture) -> None:
