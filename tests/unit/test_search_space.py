@@ -1,8 +1,7 @@
-"""The search for tests without SUMO: the space, the searchers, and the grade of an episode."""
+"""The search for tests without SUMO: the space and the searchers."""
 
 from __future__ import annotations
 
-import dataclasses
 import math
 from collections.abc import Callable
 from types import SimpleNamespace
@@ -11,17 +10,14 @@ from typing import Any
 import numpy as np
 import pytest
 
-from cavsumo.assertions.judgement import HELD, NOT_TRIGGERED, UNFAIR, VIOLATED, Judgement
 from cavsumo.model.bodies import PEDESTRIAN
 from cavsumo.model.scenario import BatchPlan
 from cavsumo.network.site import Site
-from cavsumo.results.grade import INVALID_GRADE, grade
 from cavsumo.searchers.manoeuvres import MANOEUVRES, ManoeuvreSearch
 from cavsumo.searchers.methods import SEARCHERS, searcher_of
 from cavsumo.searchers.protocol import GENERATION, PlayedPoint
 from cavsumo.searchers.space import NAMES, Point, Space, programme, space_of
 from cavsumo.searchers.words import in_common
-from cavsumo.simulation.avoidability import Avoidability
 
 
 @pytest.fixture
@@ -123,35 +119,3 @@ def test_features_that_most_failures_share() -> None:
         "from the left, 0.5 m/s, 57 degrees towards the ego, crosses the ego's way at once"
     )
     assert in_common([]) == ""
-
-
-def _episode(judgement: Judgement, outcome: str = "", min_gap: float = 1.0) -> Any:
-    """An episode that nobody saw, so that nobody was near."""
-    contacts = SimpleNamespace(min_gap=min_gap)
-    return SimpleNamespace(
-        judgement=judgement, outcome=outcome or judgement.verdict, contacts=contacts, seen=[]
-    )
-
-
-def test_grades_order_episodes() -> None:
-    """From invalid over nobody met, unfair, held and unpreventable to a hard impact."""
-    hit = Judgement("collision", VIOLATED, "tester0", impact_speed=3.0, robustness=-3.0)
-    late = Judgement("reaction-zone", UNFAIR, "tester0", ego_speed=8.0)
-    cases = [
-        (_episode(hit, "invalid"), None),
-        (_episode(Judgement("", NOT_TRIGGERED)), None),
-        (_episode(late, min_gap=1.0), None),
-        (_episode(late, min_gap=3.0), None),
-        (_episode(Judgement("reaction-zone", HELD, "tester0")), None),
-        (_episode(hit), Avoidability(False, perceived=5.0)),
-        (_episode(hit), Avoidability(False, last_chance=4.0, perceived=5.0)),
-        (_episode(hit), Avoidability(False, last_chance=4.8, perceived=5.0)),
-        (_episode(hit), Avoidability(True, last_chance=5.0, perceived=4.0)),
-        (_episode(dataclasses.replace(hit, impact_speed=8.0)), Avoidability(True)),
-    ]
-    grades = [grade(*case) for case in cases]
-    assert grades == sorted(grades)
-    assert len(set(grades)) == len(grades)
-    assert grades[0] == INVALID_GRADE
-    assert grades[-2:] == [3.0, 8.0]
-    assert sum(g >= 0.0 for g in grades) == 2
