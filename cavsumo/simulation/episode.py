@@ -31,7 +31,8 @@ class Episode:
     ``seen``: all snapshots; frames and actions only where they are kept; ``drives``: whether the
     ego steers itself; ``forecast``: what the testers said of it beforehand; ``starts``: where they
     started, and ``waited``: where they were while the ego entered; ``departures``: of the
-    background, None where they were not recorded or do not tell all of it.
+    background, None where they were not recorded or do not tell all of it; ``short``: what a human
+    driver was short of in a test that was held or unfair, as ``foresight.human_short``.
     """
 
     judgement: Judgement
@@ -61,6 +62,7 @@ class Episode:
     departures: Demand | None = None
     drives: bool = False
     forecast: Forecast | None = None
+    short: float | None = None
 
     @property
     def outcome(self) -> str:
