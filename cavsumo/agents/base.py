@@ -106,6 +106,10 @@ class Agent:
         at the horizon, where only the simulation ends.
         """
 
+    def notes(self) -> str:
+        """Notes on the episode for its searcher, a cell of its row; empty for none."""
+        return ""
+
     def recall(self) -> Any:
         """The knowledge of the agent, as plain data; None when it does not learn."""
         return None

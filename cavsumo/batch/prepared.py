@@ -16,6 +16,7 @@ import numpy as np
 
 from cavsumo.agents.casting import Cast, resolve_cast, teams
 from cavsumo.agents.manoeuvres import types_for
+from cavsumo.agents.names import SEARCH_METHODS
 from cavsumo.assertions.specs import assertions_of
 from cavsumo.batch.plan_names import check_names
 from cavsumo.egos.base import Ego
@@ -34,6 +35,7 @@ from cavsumo.network.traffic import Volume
 from cavsumo.network.traffic_lights import Pace
 from cavsumo.results.present import input_files
 from cavsumo.results.provenance import checksums, traffic_checksum, unequal, versions
+from cavsumo.searchers.methods import check_method
 from cavsumo.searchers.space import space_of
 from cavsumo.suites.cases import case_plan, case_plans, suite_inputs
 from cavsumo.sumo.options import OPTIONS
@@ -225,7 +227,9 @@ def _site(plan: BatchPlan, kind: Kind, ego: Ego, cast: Cast) -> Site:
         kinds, rng = [kind] * scenario.testers, np.random.default_rng(plan.seed)
         site.draw(kinds, ego.kind, scenario.start_speed, rng)
     if cast.searchers:
-        space_of(site, kind, teams(scenario))  # a space without a start is refused
+        space = space_of(site, kind, teams(scenario))  # a space without a start is refused
+        for label in cast.searchers:
+            check_method(str(cast[label].params.get("method", SEARCH_METHODS[0])), space)
     return site
 
 

@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 
 from cavsumo.agents.casting import teams
+from cavsumo.agents.decisions import read
 from cavsumo.batch.jobs import Memory
 from cavsumo.batch.prepared import PreparedBatch
 from cavsumo.errors import ResultsError
@@ -23,10 +24,11 @@ from cavsumo.model.bodies import kind_named
 from cavsumo.results.grade import INVALID_GRADE
 from cavsumo.results.rows import cell
 from cavsumo.searchers.methods import searcher_of
-from cavsumo.searchers.protocol import PlayedPoint
+from cavsumo.searchers.protocol import PlayedPoint, PointSpace
 from cavsumo.searchers.space import Point, Space, space_of
 from cavsumo.searchers.words import in_common
 
+TOLD = ("grade", "outcome", "avoidable", "tester", "situations")  # columns
 SPEED_BIN_MPS, PLACE_BIN_M = 2.0, 10.0  # failures within a bin are alike
 
 
@@ -60,6 +62,7 @@ class Searching:
         label: of the agent.
         space: the space of tests.
         points: those chosen so far, by the number of the agent's episode.
+        spaces: the space of each of them: the same, or that of its decisions.
     """
 
     def __init__(self, prepared: PreparedBatch, label: str) -> None:
@@ -71,6 +74,7 @@ class Searching:
         method = str(prepared.cast[label].params.get("method", "portfolio"))
         self._searcher = searcher_of(method, self.space, np.random.default_rng(seed))
         self.points: list[Point] = []
+        self.spaces: list[PointSpace] = []
         self._generation: list[int] = []  # episodes of the points that were asked for last
         self._told: dict[int, PlayedPoint] = {}
         self._lasted: dict[int, float] = {}
@@ -87,14 +91,15 @@ class Searching:
 
     def memory(self, run: int) -> Memory:
         """The memories with which the agents play an episode whose point is known."""
-        return self.space.memories(self.points[self._number(run)])
+        number = self._number(run)
+        return self.spaces[number].memories(self.points[number])
 
     def told(self, row: Mapping[str, Any]) -> None:
         """Take up the row of an episode, in any order."""
         run = int(row["run"])
         if self.ready(run):
             number = self._number(run)
-            self._told[number] = self._result(self.points[number], row)
+            self._told[number] = self._result(number, row)
             self._lasted[number] = float(cell(row["time_s"]) or 0.0)
 
     def facts(self) -> SearchFacts:
@@ -104,14 +109,14 @@ class Searching:
         first = None
         if failed:
             first = failed[0] + 1, math.fsum(self._lasted[n] for n in numbers if n <= failed[0])
-        played = [self.points[n] for n in numbers]
+        played = [self.points[n] for n in numbers if self.spaces[n] is self.space]
         return SearchFacts(
             episodes=len(numbers),
             seconds=math.fsum(self._lasted.values()),
             failures=len(failed),
             distinct=len({self._told[n].kind for n in failed}),
             first=first,
-            words=in_common([self.space.seen(self.points[n])[0] for n in failed]),
+            words=in_common([self.spaces[n].seen(self.points[n])[0] for n in failed]),
             uniform=sum(n in self._uniform for n in numbers),
             covered=self.space.covered(played),
         )
@@ -128,22 +133,22 @@ class Searching:
         asked = self._searcher.ask()
         self._generation = list(range(len(self.points), len(self.points) + len(asked)))
         self.points += asked
+        self.spaces += [self._searcher.space] * len(asked)
         if self._searcher.uniform:
             self._uniform.update(self._generation)
 
-    def _result(self, point: Point, row: Mapping[str, Any]) -> PlayedPoint:
+    def _result(self, number: int, row: Mapping[str, Any]) -> PlayedPoint:
         """The result of a point; a row of this session and one that was recorded tell the same."""
-        text = {key: cell(row[key]) for key in ("grade", "outcome", "avoidable", "tester")}
+        text = {key: cell(row[key]) for key in TOLD}
         grade = float(text["grade"]) if text["grade"] else INVALID_GRADE
         failed = text["outcome"] == "violated" and text["avoidable"] != "0" and grade >= 0.0
-        return PlayedPoint(
-            grade, failed, self._kind(point, text["tester"], grade) if failed else ()
-        )
+        kind = self._kind(number, text["tester"], grade) if failed else ()
+        return PlayedPoint(grade, failed, kind, tuple(read(text["situations"])))
 
-    def _kind(self, point: Point, tester: str, impact: float) -> tuple[object, ...]:
+    def _kind(self, number: int, tester: str, impact: float) -> tuple[object, ...]:
         """Impact speed, side and place of a failure, by which failures are alike."""
-        number = int(tester.removeprefix("tester")) if tester.startswith("tester") else 0
-        place = self.space.place(point, number)
+        body = int(tester.removeprefix("tester")) if tester.startswith("tester") else 0
+        place = self.spaces[number].place(self.points[number], body)
         return impact // SPEED_BIN_MPS, place.left, place.along // PLACE_BIN_M
 
 

@@ -33,6 +33,15 @@ def _folder(folder: Path) -> Path:
     return folder / "found.csv"
 
 
+def _halves(whole: Path, half: Path, *more: str) -> None:
+    """The same search, killed in the middle of a generation and continued, two at a time."""
+    _search(half, *more)
+    kept = half.read_bytes().splitlines(keepends=True)[: 1 + 13]
+    half.write_bytes(b"".join(kept))
+    assert _search(half, "--resume", "-j", "2", *more) in (Exit.OK, Exit.VIOLATED)
+    assert rows(half) == rows(whole)
+
+
 @pytest.fixture(scope="module")
 def found(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A search whose ego never brakes."""
@@ -47,11 +56,19 @@ def test_rows_do_not_depend_on_how_it_is_played(found: Path, tmp_path: Path) -> 
     assert _search(both, "-j", "2") == Exit.VIOLATED
     assert rows(both) == rows(found)
     assert traces(both) == traces(found)
-    _search(parts)
-    kept = parts.read_bytes().splitlines(keepends=True)[: 1 + 13]
-    parts.write_bytes(b"".join(kept))
-    assert _search(parts, "--resume", "-j", "2") == Exit.VIOLATED
-    assert rows(parts) == rows(found)
+    _halves(found, parts)
+
+
+@pytest.mark.parametrize("method", ["tree", "explore", "diversity"])
+def test_every_searcher_is_continued_from_its_rows(method: str, tmp_path: Path) -> None:
+    """Its state is what it was told, in the order of the episodes; a row says how it is played."""
+    whole, half = (_folder(tmp_path / name) for name in ("whole", "half"))
+    _search(whole, "--method", method)
+    _halves(whole, half, "--method", method)
+    played = rows(whole)
+    decided = [row["situations"] for row in played if row["situations"]]
+    assert bool(decided) is (method != "diversity")
+    assert main(["replay", str(whole), "21"]) == 0
 
 
 def test_a_search_finds_preventable_failures(found: Path) -> None:
@@ -96,6 +113,7 @@ def test_the_summary_names_common_features(tmp_path: Path, capsys: Capture) -> N
     ("words", "said"),
     [
         (["--method", "cmaes"], "argument --method: invalid choice: 'cmaes'"),
+        (["--param", "search.method=tre"], "method must be one of portfolio"),
         (["--kind", "car"], "agent search can only walk"),
         (["--shard", "1/2"], "shard 1/2: search"),
     ],
