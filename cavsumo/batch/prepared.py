@@ -36,7 +36,7 @@ from cavsumo.network.traffic_lights import Pace
 from cavsumo.results.present import input_files
 from cavsumo.results.provenance import checksums, traffic_checksum, unequal, versions
 from cavsumo.searchers.methods import check_method
-from cavsumo.searchers.space import space_of
+from cavsumo.searchers.space import Space, space_of
 from cavsumo.suites.cases import case_plan, case_plans, suite_inputs
 from cavsumo.sumo.options import OPTIONS
 
@@ -81,6 +81,12 @@ class PreparedBatch:
         """The files that are kept with the results, by their checksums: all but programs."""
         found, sums = input_files(self.plan), self.checksums
         return {sums[name]: file for name, file in found.items() if name in sums}
+
+    @cached_property
+    def space(self) -> Space:
+        """The tests from which searchers choose; raises NetworkError where it holds no start."""
+        scenario = self.plan.scenario
+        return space_of(self.site, kind_named(scenario.kind), teams(scenario))
 
     @cached_property
     def packed(self) -> bytes:
@@ -134,7 +140,8 @@ class PreparedBatch:
     def without(self, outputs: Collection[str]) -> PreparedBatch:
         """The same batch, without some files as inputs."""
         kept = {name: sum for name, sum in self.checksums.items() if name not in outputs}
-        return dataclasses.replace(self, checksums=kept)
+        same = len(kept) == len(self.checksums)
+        return self if same else dataclasses.replace(self, checksums=kept)
 
 
 def _unpacked(packed: bytes) -> PreparedBatch:
@@ -174,7 +181,10 @@ def _prepared(plan: BatchPlan, ego: Ego | None) -> PreparedBatch:
     site = _site(plan, kind, ego, cast)
     objects = objects_among([*plan.cast.values(), scenario.ego, *scenario.assertions])
     where = str(Path.cwd()), _checksums(plan, cast), versions()
-    return PreparedBatch(plan, cast, site, *where, objects=objects)
+    prepared = PreparedBatch(plan, cast, site, *where, objects=objects)
+    for label in sorted(cast.searchers):  # a space without a start is refused too
+        check_method(str(cast[label].params.get("method", SEARCH_METHODS[0])), prepared.space)
+    return prepared
 
 
 def prepare(plan: BatchPlan, ego: Ego | None = None) -> PreparedBatch:
@@ -226,10 +236,6 @@ def _site(plan: BatchPlan, kind: Kind, ego: Ego, cast: Cast) -> Site:
     if site.approaches:  # missing room must be found before the first episode
         kinds, rng = [kind] * scenario.testers, np.random.default_rng(plan.seed)
         site.draw(kinds, ego.kind, scenario.start_speed, rng)
-    if cast.searchers:
-        space = space_of(site, kind, teams(scenario))  # a space without a start is refused
-        for label in cast.searchers:
-            check_method(str(cast[label].params.get("method", SEARCH_METHODS[0])), space)
     return site
 
 

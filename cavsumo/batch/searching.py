@@ -15,17 +15,15 @@ from typing import Any
 
 import numpy as np
 
-from cavsumo.agents.casting import teams
 from cavsumo.agents.decisions import read
 from cavsumo.batch.jobs import Memory
 from cavsumo.batch.prepared import PreparedBatch
 from cavsumo.errors import ResultsError
-from cavsumo.model.bodies import kind_named
 from cavsumo.results.grade import INVALID_GRADE
 from cavsumo.results.rows import cell
 from cavsumo.searchers.methods import searcher_of
 from cavsumo.searchers.protocol import PlayedPoint, PointSpace
-from cavsumo.searchers.space import Point, Space, space_of
+from cavsumo.searchers.space import Point
 from cavsumo.searchers.words import in_common
 
 TOLD = ("grade", "outcome", "avoidable", "tester", "situations")  # columns
@@ -69,7 +67,7 @@ class Searching:
         plan = prepared.plan
         self.label, self._step = label, len(plan.agents)
         self._first = list(plan.cast).index(label)
-        self.space = space_of_batch(prepared)
+        self.space = prepared.space
         seed = np.random.SeedSequence([plan.seed, zlib.crc32(label.encode())])
         method = str(prepared.cast[label].params.get("method", "portfolio"))
         self._searcher = searcher_of(method, self.space, np.random.default_rng(seed))
@@ -150,12 +148,6 @@ class Searching:
         body = int(tester.removeprefix("tester")) if tester.startswith("tester") else 0
         place = self.spaces[number].place(self.points[number], body)
         return impact // SPEED_BIN_MPS, place.left, place.along // PLACE_BIN_M
-
-
-def space_of_batch(prepared: PreparedBatch) -> Space:
-    """The space of the tests of a batch; raises InputError where it holds no start."""
-    scenario = prepared.plan.scenario
-    return space_of(prepared.site, kind_named(scenario.kind), teams(scenario))
 
 
 def searched(

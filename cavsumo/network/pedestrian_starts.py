@@ -150,7 +150,7 @@ def _draws(
 def _along(areas: Sequence[StartingArea], kind: Kind) -> Iterator[Start]:
     """Starts on the axes of all areas, one after another, facing along and against."""
     for area in areas:
-        low, high = _range(area, kind)
+        low, high = starting_range(area, kind)
         for i in range(1 + max(0, int((high - low) / PIECE_M))):
             for forwards in (True, False):
                 yield _start(area, low + i * PIECE_M, 0.0, forwards)
@@ -211,14 +211,14 @@ def _draw(areas: Sequence[StartingArea], kind: Kind, rng: np.random.Generator) -
     margin = math.hypot(kind.length, kind.width) / 2
     weights = np.array([(a.end - a.begin) * a.width for a in areas])
     area = areas[int(rng.choice(len(areas), p=weights / weights.sum()))]
-    low, high = _range(area, kind)
+    low, high = starting_range(area, kind)
     along = float(rng.uniform(low, high)) if low < high else low
     aside = max(0.0, area.width / 2 - margin)
     lateral = float(rng.uniform(-aside, aside))
     return _start(area, along, lateral, bool(rng.integers(2)))
 
 
-def _range(area: StartingArea, kind: Kind) -> tuple[float, float]:
+def starting_range(area: StartingArea, kind: Kind) -> tuple[float, float]:
     """The interval of arc lengths in which a body may start on an area [m]."""
     margin = math.hypot(kind.length, kind.width) / 2
     low, high = max(area.begin, margin), min(area.end, area.pavement.length - margin)

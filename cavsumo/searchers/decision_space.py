@@ -17,13 +17,16 @@ from numpy.typing import NDArray
 
 from cavsumo.agents.decisions import Decision, Decisions
 from cavsumo.agents.programme import WalkProgramme
-from cavsumo.searchers.space import NAMES, SLOWEST_MPS, Place, Point, Space
+from cavsumo.searchers.places import Place, within
+from cavsumo.searchers.space import Point, Space
+from cavsumo.searchers.walks import SLOWEST_MPS
 
 DECISIONS = 10
 ARRIVALS_S = (1.0, 8.0)
 STANDING = 0.2  # a speed below is to stand
 SAME, STAND, ACROSS = 0.4, 0.2, 0.3  # how often a body decides so; else it turns anywhere
 OBLIQUE = (1.0 / 3.0, 2.0 / 3.0)  # of all headings those within 60 degrees of the way across
+STRAIGHT = {"speed": 1.0, "heading": 0.5, "depth": 1.0}
 NOT_KNOWN = math.nan
 
 
@@ -100,22 +103,22 @@ class DecisionSpace:
         return point.reshape(1 + DECISIONS, self.width)
 
     def _starts(self, point: Point) -> Point:
-        """A point of the other space whose bodies start there."""
+        """A point of the other space whose bodies start there, to go straight across."""
         found = np.full(self.base.dimension, 0.25)
         for i in range(self.base.bodies):
-            found[i * len(NAMES) + NAMES.index("place")] = point[2 * i]
+            for name, share in {**STRAIGHT, "place": point[2 * i]}.items():
+                found[self.base.index(i, name)] = share
         return found
 
     def _decisions(self, point: Point, body: int) -> Decisions:
         """The decisions of one body."""
         rows = self.rows(point)[:, 2 * body : 2 * body + 2].tolist()
-        low, high = ARRIVALS_S
-        return Decisions(low + rows[0][1] * (high - low), [self._decided(*r) for r in rows[1:]])
+        return Decisions(within(ARRIVALS_S, rows[0][1]), [self._decided(*row) for row in rows[1:]])
 
     def _decided(self, heading: float, speed: float) -> Decision:
         """The decision of two numbers."""
         share = (speed - STANDING) / (1.0 - STANDING)
-        fast = SLOWEST_MPS + share * (self.base.kind.v_max - SLOWEST_MPS)
+        fast = within((SLOWEST_MPS, self.base.movements.kind.v_max), share)
         return Decision((2.0 * heading - 1.0) * math.pi, 0.0 if share < 0.0 else fast)
 
     def _likeness(self, point: Point, body: int) -> WalkProgramme:

@@ -1,4 +1,4 @@
-"""Quality diversity: the best point of every cell of impact speed, side, place and manoeuvre.
+"""Quality diversity: the best point of every cell of impact speed, side, place and manner.
 
 CMA-ME (Fontaine et al., arXiv 1912.02400) by the package ``ribs``: emitters adapt the covariance of
 their points to what fills cells or improves them.
@@ -6,14 +6,12 @@ their points to what fills cells or improves them.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from importlib.util import find_spec
 from typing import Any
 
 import numpy as np
 
-from cavsumo.agents.programme import WalkProgramme
 from cavsumo.errors import InputError
 from cavsumo.searchers.protocol import GENERATION, PlayedPoint, Searcher
 from cavsumo.searchers.space import STRETCH_M, Point, Space
@@ -22,9 +20,6 @@ FIRST = 2  # generations of another searcher, from whose best points the emitter
 EMITTERS = 2
 SIGMA = 0.15
 IMPACT_MPS, IMPACTS = 2.0, 5  # cells of impact speed, besides the one of no preventable failure
-IN_THE_WAY_M, THROUGH_M = 0.0, 2.4  # how deep in the ego's strip a first leg ends there
-TURNS_RAD = (math.radians(45.0), math.radians(120.0))  # a second leg on, along, or back
-MANOEUVRES = 7
 
 
 class DiversitySearch:
@@ -34,7 +29,7 @@ class DiversitySearch:
 
     def __init__(self, space: Space, rng: np.random.Generator, first: Searcher) -> None:
         self.space, self.rng, self.first = space, rng, first
-        stretches = {(place.left, place.along // STRETCH_M) for place in space.places}
+        stretches = {(p.left, p.along // STRETCH_M) for p in space.movements.places}
         self._stretches = {one: i for i, one in enumerate(sorted(stretches))}
         self._generation = 0
         self._archive = self._empty()
@@ -59,17 +54,18 @@ class DiversitySearch:
             self._archive.add(np.array(points), grades, cells)
         self._asked = False
 
-    def _cell(self, point: Point, result: PlayedPoint) -> tuple[int, int, int]:
-        """The cell of a point: impact speed, side and place, manoeuvre of the first body."""
-        place, programme = self.space.seen(point)[0]
+    def _cell(self, point: Point, result: PlayedPoint) -> tuple[int, ...]:
+        """The cell of a point: impact speed, side and place, manner of the first body."""
+        place = self.space.place(point, 0)
         impact = 1 + min(IMPACTS - 1, int(result.grade // IMPACT_MPS)) if result.failed else 0
-        return impact, self._stretches[place.left, place.along // STRETCH_M], manoeuvre(programme)
+        stretch = self._stretches[place.left, place.along // STRETCH_M]
+        return impact, stretch, *self.space.manner(point)
 
     def _empty(self) -> Any:
         """An archive without points."""
         from ribs.archives import GridArchive
 
-        dims = (1 + IMPACTS, len(self._stretches), MANOEUVRES)
+        dims = (1 + IMPACTS, len(self._stretches), *(3 for _ in self.space.movements.manner))
         return GridArchive(
             solution_dim=self.space.dimension,
             dims=dims,
@@ -103,14 +99,6 @@ class DiversitySearch:
     def _seed(self) -> int:
         """A seed for the package."""
         return int(self.rng.integers(2**31))
-
-
-def manoeuvre(programme: WalkProgramme) -> int:
-    """The kind of a programme: across at once; else where the first leg ends, and what follows."""
-    if programme.depth >= THROUGH_M:
-        return 0
-    turn = sum(abs(programme.heading_2) > limit for limit in TURNS_RAD)
-    return 1 + 3 * (programme.depth >= IN_THE_WAY_M) + turn
 
 
 def check_installed() -> None:

@@ -12,20 +12,26 @@ from dataclasses import dataclass
 import numpy as np
 
 from cavsumo.searchers.protocol import GENERATION, PlayedPoint
-from cavsumo.searchers.space import NAMES, Point, Space
+from cavsumo.searchers.space import Point, Space
 
 Range = tuple[float, float]
 STRAIGHT: Range = (0.45, 0.55)
 THROUGH: Range = (0.98, 1.0)
 LATE: Range = (0.15, 0.5)  # as an ego that did not react before could hardly stop
 EARLY: Range = (0.2, 1.0)
+SHORT: Range = (0.1, 0.4)  # as an ego that keeps its speed could not stop any more
 
-# For each manoeuvre the ranges of some numbers of ``space.NAMES``.
-MANOEUVRES: Mapping[str, Mapping[str, Range]] = {
+# For each manoeuvre the ranges of some coordinates of ``walks.Walks``.
+WALKS: Mapping[str, Mapping[str, Range]] = {
     "crosses": {"zone": LATE, "speed": (0.5, 1.0), "heading": STRAIGHT, "depth": THROUGH},
     "crosses slowly": {"zone": LATE, "speed": (0.0, 0.35), "heading": STRAIGHT, "depth": THROUGH},
     "comes towards": {"zone": LATE, "speed": (0.0, 0.6), "heading": (0.0, 0.35), "depth": THROUGH},
     "walks away": {"zone": LATE, "heading": (0.65, 1.0), "depth": THROUGH},
+    "comes closer, then steps in": {
+        "zone": SHORT, "speed": (0.0, 0.5), "heading": (0.1, 0.6), "depth": (0.05, 0.3),
+        "resume": (0.0, 0.12), "speed_2": (0.7, 1.0), "heading_2": (0.3, 0.5),
+        "length_2": (0.7, 1.0), "heading_3": (0.3, 0.5),
+    },
     "hesitates": {
         "zone": EARLY, "depth": (0.05, 0.4), "resume": (0.1, 0.5), "heading_2": STRAIGHT,
         "heading_3": STRAIGHT,
@@ -44,11 +50,13 @@ MANOEUVRES: Mapping[str, Mapping[str, Range]] = {
     },
     "stands": {"zone": EARLY, "depth": (0.35, 0.8), "resume": (0.4, 0.5)},
 }  # fmt: skip
+# By the name of the movements.
+MANOEUVRES: Mapping[str, Mapping[str, Mapping[str, Range]]] = {"walks": WALKS}
 
 
 @dataclass
 class ManoeuvreSearch:
-    """Each point one of ``MANOEUVRES`` for each body, in turn."""
+    """Each point one of the known manoeuvres for each body, in turn."""
 
     space: Space
     rng: np.random.Generator
@@ -62,10 +70,10 @@ class ManoeuvreSearch:
         """Nothing is learned."""
 
     def _drawn(self) -> Point:
-        point, named = self.rng.random(self.space.dimension), list(MANOEUVRES)
+        point = self.rng.random(self.space.dimension)
+        known = list(MANOEUVRES[self.space.movements.name].values())
         for i in range(self.space.bodies):
-            ranges = MANOEUVRES[named[(self.turn + i) % len(named)]]
-            for name, (low, high) in ranges.items():
-                point[i * len(NAMES) + NAMES.index(name)] = self.rng.uniform(low, high)
+            for name, (low, high) in known[(self.turn + i) % len(known)].items():
+                point[self.space.index(i, name)] = self.rng.uniform(low, high)
         self.turn += 1
         return point

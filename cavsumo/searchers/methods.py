@@ -53,8 +53,8 @@ def check_method(method: str, space: Space) -> None:
     """Raise InputError where a method cannot search a space."""
     if method == "diversity":
         check_installed()
-    if method in BY_DECISIONS and space.kind.name not in WALKING:
+    if method in BY_DECISIONS and space.movements.kind.name not in WALKING:
         raise InputError(
             f"search.method {method}: decides for {' and '.join(WALKING)}s alone; choose another "
-            f"method for kind {space.kind.name!r}"
+            f"method for kind {space.movements.kind.name!r}"
         )

@@ -1,6 +1,6 @@
 """Search near the best points so far: a preventable failure is rarely alone.
 
-One point is kept for each manner of walking (MAP-Elites: Mouret and Clune, arXiv 1504.04909), so
+One point is kept for each manner of moving (MAP-Elites: Mouret and Clune, arXiv 1504.04909), so
 that a manner in which the ego only ever comes close to failing does not hide the others.
 """
 
@@ -12,9 +12,8 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from cavsumo.searchers.protocol import GENERATION, PlayedPoint, Searcher
-from cavsumo.searchers.space import NAMES, Point, Space
+from cavsumo.searchers.space import Point, Space
 
-MANNER = ("speed", "heading", "depth")  # numbers whose thirds tell manners of walking apart
 BEST, SHARE_OF_BEST = 4, 0.6  # how often one of so many best points is varied
 SPREAD = 0.08  # typical step of a number
 SHARE = 0.4  # of the numbers change
@@ -39,7 +38,7 @@ class NeighbourSearch:
 
     def tell(self, points: Sequence[Point], told: Sequence[PlayedPoint]) -> None:
         for point, result in zip(points, told, strict=True):
-            manner = tuple(min(2, int(3 * point[NAMES.index(name)])) for name in MANNER)
+            manner = self.space.manner(point)
             if manner not in self.best or result.grade > self.best[manner][0]:
                 self.best[manner] = result.grade, point
 

@@ -37,7 +37,7 @@ class Portfolio:
             "cma": EvolutionSearch(space, next(streams)),
             "random": RandomSearch(space, next(streams)),
         }
-        if space.kind.name in WALKING:
+        if space.movements.kind.name in WALKING:
             decisions = DecisionSpace(space)
             self.members["tree"] = TreeSearch(decisions, next(streams))
             self.members["explore"] = ExploreSearch(decisions, next(streams))

@@ -10,7 +10,8 @@ import numpy as np
 
 from cavsumo.agents.decisions import Situation
 from cavsumo.agents.programme import WalkProgramme
-from cavsumo.searchers.space import Place, Point, Space
+from cavsumo.searchers.places import Place
+from cavsumo.searchers.space import Point, Space
 
 GENERATION = 10  # points that are chosen together, before any of them is played
 LOWEST_GRADE = -5.0  # of an invalid episode (``results.grade``); from 0 on are preventable failures

@@ -7,7 +7,8 @@ from collections.abc import Callable, Sequence
 from statistics import median
 
 from cavsumo.agents.programme import WalkProgramme
-from cavsumo.searchers.space import DEPTHS_M, Place
+from cavsumo.searchers.places import Place
+from cavsumo.searchers.walks import DEPTHS_M
 
 Failure = tuple[Place, WalkProgramme]
 

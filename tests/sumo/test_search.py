@@ -11,6 +11,7 @@ import pytest
 from support import rows, traces
 
 import cavsumo
+from cavsumo.batch import prepared
 from cavsumo.cli import main
 from cavsumo.errors import Exit, NetworkError
 from cavsumo.model.bodies import PEDESTRIAN
@@ -126,6 +127,14 @@ def test_a_search_that_is_impossible_is_refused(
     assert _search(file, *words) == Exit.USAGE
     assert said in capsys.readouterr().err
     assert not list(tmp_path.iterdir())
+
+
+def test_the_space_is_derived_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The check of a batch and its search share it."""
+    derived = []
+    monkeypatch.setattr(prepared, "space_of", lambda *a: derived.append(a) or space_of(*a))
+    assert _search(tmp_path / "found.csv", "--exit-zero", runs=2) == 0
+    assert len(derived) == 1
 
 
 def test_another_space_is_not_continued(found: Path, capsys: Capture) -> None:

@@ -13,15 +13,19 @@ import pytest
 
 from cavsumo.assertions.judgement import HELD, NOT_TRIGGERED, UNFAIR, VIOLATED, Judgement
 from cavsumo.model.bodies import PEDESTRIAN
+from cavsumo.model.carriageway import Limit
 from cavsumo.model.scenario import BatchPlan
 from cavsumo.network.site import Site
 from cavsumo.results.grade import INVALID_GRADE, grade
 from cavsumo.searchers.manoeuvres import MANOEUVRES, ManoeuvreSearch
 from cavsumo.searchers.methods import SEARCHERS, searcher_of
 from cavsumo.searchers.protocol import GENERATION, PlayedPoint
-from cavsumo.searchers.space import NAMES, Point, Space, programme, space_of
+from cavsumo.searchers.space import Point, Space, space_of
+from cavsumo.searchers.walks import Walks, walk_of
 from cavsumo.searchers.words import in_common
 from cavsumo.simulation.avoidability import Avoidability
+
+SIDES = (False, True)  # from the right, from the left
 
 
 @pytest.fixture
@@ -32,12 +36,12 @@ def space(staged: Callable[..., tuple[BatchPlan, Site]]) -> Space:
 
 def test_a_place_is_beside_the_path(space: Space) -> None:
     """From the right first, each in the order in which the ego comes there."""
-    for left in (False, True):
-        along = [place.along for place in space.places if place.left is left]
+    for left in SIDES:
+        along = [place.along for place in space.movements.places if place.left is left]
         assert len(along) > 50
         assert along == sorted(along)
     path = space.site.route.path
-    for place in space.places:
+    for place in space.movements.places:
         assert (path.project(place.start.x, place.start.y).lateral > 0.0) is place.left
 
 
@@ -47,7 +51,7 @@ def test_a_point_is_starts_and_programmes(space: Space) -> None:
     first, second = space.memories(point)
     assert len(first["starts"]) == len(second["starts"]) == 1
     assert first["programmes"] == second["programmes"]
-    assert len(first["programmes"][0]) == len(NAMES)
+    assert len(first["programmes"][0]) == len(Walks.names)
     (x, y), (u, v) = (memory["starts"][0][:2] for memory in (first, second))
     assert math.dist((x, y), (u, v)) > 1.2  # the place was taken
     point[-1] = 0.75
@@ -55,11 +59,42 @@ def test_a_point_is_starts_and_programmes(space: Space) -> None:
     assert len(space.seen(point)) == 1
 
 
+def test_every_number_of_a_point_has_a_body_and_a_name(space: Space) -> None:
+    """No two numbers have the same, and a number is found by them."""
+    assert len(set(space.coordinates)) == space.dimension
+    assert {c.body for c in space.coordinates} == {0, 1}
+    point = np.arange(space.dimension) / space.dimension
+    for i, (body, name) in enumerate(space.coordinates):
+        assert space.share(point, body, name) == point[i]
+    with pytest.raises(KeyError):
+        space.index(0, "presence")  # the first body always takes part
+
+
+def test_a_slow_body_starts_where_it_is_in_time(space: Space) -> None:
+    """The longer it walks to the ego's strip, the farther along the path; all if nowhere."""
+    quick = {name: 0.5 for name in space.movements.names} | {"speed": 1.0, "depth": 1.0}
+    slow = quick | {"speed": 0.5}
+    firsts: list[dict[bool, float]] = []
+
+    def limited(speed: float) -> Any:
+        movements: Any = space.movements
+        return dataclasses.replace(movements, limits=(Limit(0.0, speed),))
+
+    for shares in (quick, slow):
+        suited = limited(7.0).suited(shares)
+        assert set(suited) < set(space.movements.places)
+        firsts.append({left: min(p.along for p in suited if p.left is left) for left in SIDES})
+    assert all(firsts[0][left] + 5.0 < firsts[1][left] for left in SIDES)
+    assert firsts[0][False] < firsts[0][True]  # from the left it is farther to the strip
+    assert limited(500.0).suited(quick) == space.movements.places
+
+
 def test_a_programme_stays_within_natural_limits() -> None:
     """At the corners of the cube, and the pause ends by time or by the place of the ego."""
     rng = np.random.default_rng(1)
-    for numbers in [[0.0] * 10, [1.0] * 10, *rng.random((50, 10)).tolist()]:
-        walk = programme(numbers, PEDESTRIAN)
+    size = len(Walks.names)
+    for numbers in [[0.0] * size, [1.0] * size, *rng.random((50, size)).tolist()]:
+        walk = walk_of(dict(zip(Walks.names, numbers, strict=True)), PEDESTRIAN)
         for speed in (walk.speed, walk.speed_2):
             assert 0.3 <= speed <= PEDESTRIAN.v_max
         assert abs(walk.heading) < math.pi / 2
@@ -107,8 +142,8 @@ def test_what_was_good_is_looked_at_more_closely(space: Space, method: str) -> N
 
 def test_every_manoeuvre_is_within_the_space(space: Space) -> None:
     """Its numbers are numbers of the space, in [0, 1], and a round has all of them."""
-    for ranges in MANOEUVRES.values():
-        assert set(ranges) <= set(NAMES)
+    for ranges in MANOEUVRES[space.movements.name].values():
+        assert set(ranges) <= set(space.movements.names)
         assert all(0.0 <= low <= high <= 1.0 for low, high in ranges.values())
     drawn = [p for _ in range(2) for p in ManoeuvreSearch(space, np.random.default_rng(1)).ask()]
     assert all((point >= 0.0).all() and (point <= 1.0).all() for point in drawn)
@@ -116,7 +151,7 @@ def test_every_manoeuvre_is_within_the_space(space: Space) -> None:
 
 def test_features_that_most_failures_share() -> None:
     """Side, speed, angle, manner."""
-    walk = programme([0.5] * 10, PEDESTRIAN)
+    walk = walk_of(dict.fromkeys(Walks.names, 0.5), PEDESTRIAN)
     slow = walk._replace(speed=0.5, heading=-1.0, depth=3.0)
     place: Any = SimpleNamespace(left=True)
     assert in_common([(place, slow), (place, slow)]) == (

@@ -1,0 +1,111 @@
+"""The movements of pedestrians in a space of tests: their numbers, places and programmes."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import ClassVar
+
+from cavsumo.agents.programme import WalkProgramme, entry_of, zone_m
+from cavsumo.errors import NetworkError
+from cavsumo.model.bodies import CAR, Kind
+from cavsumo.model.carriageway import Limit, Start
+from cavsumo.network.pedestrian_starts import APART_M, starting_range
+from cavsumo.network.site import Site
+from cavsumo.searchers.places import NEAREST_M, Place, within
+
+PLACE_M = 0.5  # distance of two places along a pavement
+SLOWEST_MPS = 0.3
+OBLIQUE_RAD = math.radians(60.0)  # of the first leg, to either side
+ZONES = (-0.8, 1.6)  # where an ego that does not react would be as a body comes into its way
+RESUMED = (-0.5, 2.5)  # where it is as a body goes on
+DEPTHS_M = (-1.5, 3.0)
+LONGEST_PAUSE_S = 2.0
+LONGEST_M = 5.0  # of the second leg
+
+
+@dataclass(frozen=True)
+class Walks:
+    """The movements of pedestrians at one site (``space.Movements``)."""
+
+    kind: Kind
+    places: tuple[Place, ...]
+    limits: tuple[Limit, ...] = ()
+
+    name: ClassVar[str] = "walks"
+    names: ClassVar[tuple[str, ...]] = (
+        "place", "zone", "speed", "heading", "depth", "resume", "speed_2", "heading_2", "length_2",
+        "heading_3",
+    )  # fmt: skip
+    manner: ClassVar[tuple[str, ...]] = ("speed", "heading", "depth")
+
+    def suited(self, shares: Mapping[str, float]) -> tuple[Place, ...]:
+        """The places from which the programme of the numbers can be in time; all if none can.
+
+        The ego is expected to drive at the limit.
+        """
+        walk = walk_of(shares, self.kind)
+        return tuple(p for p in self.places if self._in_time(walk, p)) or self.places
+
+    def realised(self, place: Place, shares: Mapping[str, float]) -> tuple[Place, WalkProgramme]:
+        """The place as it is, and the programme of the numbers."""
+        return place, walk_of(shares, self.kind)
+
+    def _in_time(self, walk: WalkProgramme, place: Place) -> bool:
+        """Whether the ego is still to come when a body has to step off for its programme."""
+        entry, shift = entry_of(walk, place.away, self.kind)
+        v = [0.0, *(one.speed for one in self.limits if one.along <= place.along)][-1]
+        return place.along + shift >= v * entry + zone_m(walk.zone, v)
+
+    def apart(self, one: Place, other: Place) -> bool:
+        """Whether two bodies can start at two places."""
+        a, b = one.start, other.start
+        return math.dist((a.x, a.y), (b.x, b.y)) > APART_M
+
+
+def walk_of(shares: Mapping[str, float], kind: Kind) -> WalkProgramme:
+    """The programme of the numbers of one body, each in [0, 1]."""
+    speeds, resume = (SLOWEST_MPS, kind.v_max), shares["resume"]
+    waits = resume > 0.5
+    return WalkProgramme(
+        zone=within(ZONES, shares["zone"]),
+        speed=within(speeds, shares["speed"]),
+        heading=within((-OBLIQUE_RAD, OBLIQUE_RAD), shares["heading"]),
+        depth=within(DEPTHS_M, shares["depth"]),
+        pause=0.0 if waits else max(0.0, resume - 0.1) / 0.4 * LONGEST_PAUSE_S,
+        resume=within(RESUMED, 2.0 * resume - 1.0) if waits else None,
+        speed_2=within(speeds, shares["speed_2"]),
+        heading_2=within((-math.pi, math.pi), shares["heading_2"]),
+        length_2=LONGEST_M * shares["length_2"],
+        heading_3=within((-math.pi, math.pi), shares["heading_3"]),
+    )
+
+
+def walks_at(site: Site, kind: Kind) -> Walks:
+    """The movements of pedestrians at a site; raises NetworkError where nobody meets the ego."""
+    places = sorted(_places(site, kind), key=lambda p: (p.left, p.along))
+    if not places:
+        raise NetworkError(
+            f"{site.net}: a search finds no place for a pedestrian whose way across meets the "
+            f"ego's route {NEAREST_M:g} m or more from its beginning; choose another --ego-route"
+        )
+    return Walks(kind, tuple(places), site.limits)
+
+
+def _places(site: Site, kind: Kind) -> list[Place]:
+    """All places on the pavements of a site from which the ego can be met."""
+    found = []
+    for area in site.areas:
+        low, high = starting_range(area, kind)
+        for i in range(math.floor((high - low) / PLACE_M) + 1):
+            x, y, o = area.pavement.at(low + i * PLACE_M)
+            way = site.roads.crossing(x, y)
+            met = site.route.path.meet(x, y, way.heading) if way else None
+            if way is None or met is None or met[1] < NEAREST_M:
+                continue
+            strip = met[0] - (CAR.width + kind.length) / 2
+            left = math.sin(site.route.path.at(met[1])[2] - way.heading) > 0.0
+            start = Start(x, y, o, area.pavement, 0.0, True, area.walk)
+            found.append(Place(start, left, met[1], max(0.0, strip)))
+    return found
