@@ -16,8 +16,8 @@ from cavsumo.agents.decisions import DecidedWalk, Decision, Decisions, written
 from cavsumo.agents.names import SEARCH, SEARCH_METHODS
 from cavsumo.agents.programme import ProgrammedWalk, WalkProgramme
 from cavsumo.agents.recorded import start_of
+from cavsumo.errors import UnknownName
 from cavsumo.model.bodies import Action
-from cavsumo.model.checks import choice
 from cavsumo.model.scene import Scene
 from cavsumo.model.snapshot import Snapshot
 
@@ -38,7 +38,9 @@ class SearchAgent(Agent):
     searches = True
 
     def __init__(self, method: str = "portfolio", earlier: str = "") -> None:
-        self.method, self.earlier = choice("method", method, SEARCH_METHODS), earlier
+        if method not in SEARCH_METHODS:
+            raise UnknownName("method", method, SEARCH_METHODS, f"agent {SEARCH}")
+        self.method, self.earlier = method, earlier
         self._programmes: list[Programme | None] = []
 
     def reset(self, scene: Scene, owned: Sequence[int], rng: np.random.Generator) -> None:

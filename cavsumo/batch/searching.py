@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 import zlib
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -18,9 +18,9 @@ import numpy as np
 from cavsumo.agents.decisions import read
 from cavsumo.batch.jobs import Memory
 from cavsumo.batch.prepared import PreparedBatch
-from cavsumo.errors import ResultsError
 from cavsumo.results.grade import INVALID_GRADE
 from cavsumo.results.rows import cell
+from cavsumo.searchers.continued import ContinuedSearch
 from cavsumo.searchers.methods import searcher_of
 from cavsumo.searchers.protocol import PlayedPoint, PointSpace
 from cavsumo.searchers.space import Point
@@ -58,19 +58,22 @@ class Searching:
 
     Attributes:
         label: of the agent.
+        searcher: of the points.
         space: the space of tests.
         points: those chosen so far, by the number of the agent's episode.
         spaces: the space of each of them: the same, or that of its decisions.
     """
 
-    def __init__(self, prepared: PreparedBatch, label: str) -> None:
+    def __init__(self, prepared: PreparedBatch, label: str, first: Sequence[Point] = ()) -> None:
+        """``first``: points of the searcher's space to begin with."""
         plan = prepared.plan
         self.label, self._step = label, len(plan.agents)
         self._first = list(plan.cast).index(label)
         self.space = prepared.space
         seed = np.random.SeedSequence([plan.seed, zlib.crc32(label.encode())])
         method = str(prepared.cast[label].params.get("method", "portfolio"))
-        self._searcher = searcher_of(method, self.space, np.random.default_rng(seed))
+        searcher = searcher_of(method, self.space, np.random.default_rng(seed))
+        self.searcher = ContinuedSearch(searcher, first) if first else searcher
         self.points: list[Point] = []
         self.spaces: list[PointSpace] = []
         self._generation: list[int] = []  # episodes of the points that were asked for last
@@ -100,6 +103,13 @@ class Searching:
             self._told[number] = self._result(number, row)
             self._lasted[number] = float(cell(row["time_s"]) or 0.0)
 
+    def best(self) -> list[tuple[PointSpace, Point]]:
+        """The points that were told, with their spaces: the best of each kind, then the others."""
+        ranked = sorted(self._told, key=lambda n: (-self._told[n].grade, n))
+        firsts = {self._told[n].kind: n for n in reversed(ranked)}
+        chosen = dict.fromkeys((*(n for n in ranked if n in firsts.values()), *ranked))
+        return [(self.spaces[n], self.points[n]) for n in chosen]
+
     def facts(self) -> SearchFacts:
         """The findings so far."""
         numbers = sorted(self._told)
@@ -127,12 +137,12 @@ class Searching:
         """Tell the searcher of its last generation and ask it for the next."""
         if self._generation:
             points = [self.points[n] for n in self._generation]
-            self._searcher.tell(points, [self._told[n] for n in self._generation])
-        asked = self._searcher.ask()
+            self.searcher.tell(points, [self._told[n] for n in self._generation])
+        asked = self.searcher.ask()
         self._generation = list(range(len(self.points), len(self.points) + len(asked)))
         self.points += asked
-        self.spaces += [self._searcher.space] * len(asked)
-        if self._searcher.uniform:
+        self.spaces += [self.searcher.space] * len(asked)
+        if self.searcher.uniform:
             self._uniform.update(self._generation)
 
     def _result(self, number: int, row: Mapping[str, Any]) -> PlayedPoint:
@@ -148,19 +158,3 @@ class Searching:
         body = int(tester.removeprefix("tester")) if tester.startswith("tester") else 0
         place = self.spaces[number].place(self.points[number], body)
         return impact // SPEED_BIN_MPS, place.left, place.along // PLACE_BIN_M
-
-
-def searched(
-    prepared: PreparedBatch, label: str, rows: Iterable[Mapping[str, Any]], run: int
-) -> Memory:
-    """The memories with which the agents of a search played an episode, from the rows before it.
-
-    Raises ResultsError where rows are missing.
-    """
-    search = Searching(prepared, label)
-    for row in rows:
-        if row["agent"] == label and int(row["run"]) < run:
-            search.told(row)
-    if not search.ready(run):
-        raise ResultsError(f"run {run} cannot be found again: rows of the search before it miss")
-    return search.memory(run)

@@ -17,6 +17,7 @@ from cavsumo.errors import Exit, NetworkError
 from cavsumo.model.bodies import PEDESTRIAN
 from cavsumo.model.scenario import BatchPlan
 from cavsumo.network.site import Site
+from cavsumo.results.traces import read_trace
 from cavsumo.searchers.space import space_of
 
 Capture = pytest.CaptureFixture[str]
@@ -32,6 +33,11 @@ def _folder(folder: Path) -> Path:
     """A results file of the same name in a folder of its own, as traces are named by it."""
     folder.mkdir()
     return folder / "found.csv"
+
+
+def _point(file: Path, row: dict[str, str]) -> Any:
+    """What the trace of an episode says that its agents played."""
+    return read_trace(file.parent / row["trace"]).head["memory"]
 
 
 def _halves(whole: Path, half: Path, *more: str) -> None:
@@ -110,11 +116,42 @@ def test_the_summary_names_common_features(tmp_path: Path, capsys: Capture) -> N
     assert "of the 10 points drawn at random none failed, so at most 30.8% of the space" in said
 
 
+@pytest.mark.parametrize("method", ["portfolio", "cma", "explore"])
+def test_a_search_begins_with_what_an_earlier_one_found(
+    method: str, found: Path, tmp_path: Path
+) -> None:
+    """Its best points are played first; decisions are no points of a search by programmes."""
+    earlier = ["--param", f"search.earlier={found}", "--method", method]
+    whole, half = (_folder(tmp_path / name) for name in ("whole", "half"))
+    assert _search(whole, *earlier) == Exit.VIOLATED
+    _halves(whole, half, *earlier)
+    first, best = rows(whole)[0], max(rows(found), key=lambda row: float(row["grade"]))
+    assert bool(first["situations"]) is (method == "explore")
+    assert method == "explore" or _point(whole, first) == _point(found, best)
+
+
+@pytest.mark.parametrize(
+    ("more", "said"),
+    [
+        (["--testers", "2"], "is of another space: testers was 1, is 2"),
+        (["--net", "crossing"], "is of another network, pedestrians, not crossing"),
+    ],
+)
+def test_an_earlier_search_of_another_space_is_refused(
+    more: list[str], said: str, found: Path, tmp_path: Path, capsys: Capture
+) -> None:
+    """One sentence, and nothing is written."""
+    file = tmp_path / "no.csv"
+    assert _search(file, "--param", f"search.earlier={found}", *more) == Exit.USAGE
+    assert said in capsys.readouterr().err
+    assert not list(tmp_path.iterdir())
+
+
 @pytest.mark.parametrize(
     ("words", "said"),
     [
-        (["--method", "cmaes"], "argument --method: invalid choice: 'cmaes'"),
-        (["--param", "search.method=tre"], "method must be one of portfolio"),
+        (["--method", "explor"], "unknown method 'explor'; did you mean 'explore'?"),
+        (["--param", "search.method=tre"], "unknown method 'tre'; did you mean 'tree'?"),
         (["--kind", "car"], "agent search can only walk"),
         (["--shard", "1/2"], "shard 1/2: search"),
     ],
