@@ -21,9 +21,9 @@ from cavsumo.searchers.decision_space import DecisionSpace
 from cavsumo.searchers.protocol import GENERATION, LOWEST_GRADE, PlayedPoint
 from cavsumo.searchers.space import Point
 
-WIDTH, GROWTH = 2.0, 0.5  # a node of n visits has at most so many decisions: WIDTH n ** GROWTH
+WIDTH, GROWTH = 1.5, 0.4  # a node of n visits has at most so many decisions: WIDTH n ** GROWTH
 STATES, SPREADING = 1.0, 0.3  # likewise the situations that follow a decision
-CURIOSITY = 0.5  # weight of what has hardly been tried
+CURIOSITY = 0.3  # weight of what has hardly been tried
 HARD_MPS = 10.0  # an impact counts as so much of a whole further worth
 
 
@@ -37,7 +37,10 @@ class TreeNode:
 
 @dataclass
 class TriedDecision:
-    """A decision at a node: how often it was followed, and the worth of those episodes."""
+    """A decision at a node: how often it was followed, and the worth of the best episode so far.
+
+    The best one counts and not their mean, as an episode with the same decisions is much the same.
+    """
 
     decision: NDArray[np.float64]
     visits: int = 0
@@ -79,9 +82,8 @@ class TreeSearch:
         return self.space.completed(self.rng, np.array(rows).reshape(-1, self.space.width))
 
     def _bound(self, edge: TriedDecision, visits: int) -> float:
-        """The upper confidence bound of a decision; it is worth nothing until it is told."""
-        mean = edge.worth / edge.told if edge.told else 0.0
-        return mean + CURIOSITY * math.sqrt(math.log(visits) / max(1, edge.visits))
+        """The upper confidence bound of a decision."""
+        return edge.worth + CURIOSITY * math.sqrt(math.log(visits) / max(1, edge.visits))
 
     def _situation(self, edge: TriedDecision) -> Situation:
         """A situation that follows a decision, as often as it did."""
@@ -96,7 +98,7 @@ class TreeSearch:
         for decision, after in zip(rows, (*result.situations, None), strict=False):
             edge = self._edge(node, decision)
             edge.told += 1
-            edge.worth += worth
+            edge.worth = max(edge.worth, worth)
             if after is None:
                 return
             node = _following(edge, after)
