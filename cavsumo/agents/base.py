@@ -113,6 +113,10 @@ class Agent:
         """
         return False
 
+    def notes(self) -> str:
+        """Notes on the episode for its searcher, a cell of its row; empty for none."""
+        return ""
+
     def recall(self) -> Any:
         """The knowledge of the agent, as plain data; None when it does not learn."""
         return None

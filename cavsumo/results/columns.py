@@ -379,6 +379,15 @@ _ALL = (
         since="0.2",
     ),
     Column(
+        "situations",
+        "for each decision of a searched tester the situation: gap, closing speed and lateral "
+        "place, in steps (docs/search.md)",
+        "",
+        Measured(lambda episode: episode.notes or None),
+        words=True,
+        since="0.2",
+    ),
+    Column(
         "cost",
         "time that the testers spent on the carriageway, together",
         "s",

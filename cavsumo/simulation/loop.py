@@ -178,6 +178,7 @@ class EpisodeLoop:
         episode.rms_acceleration = episode.naturalness.rms_acceleration(
             episode.steps, self.scene.dt
         )
+        episode.notes = self._agents[0].notes() if self._agents else ""
         spoilt = self._validity.spoils(episode.judgement)
         late = self.snapshot.time >= self.setup.scenario.end - 1e-9
         arrived = True if self._arrived else False if late else None

@@ -42,7 +42,17 @@ ROOMS = {
 }
 ROOT = {"__init__", "__main__", "errors"}
 
-OPTIONAL = {"IPython", "PIL", "dask", "distributed", "numba", "osmium", "pettingzoo", "pytest"}
+OPTIONAL = {
+    "IPython",
+    "PIL",
+    "dask",
+    "distributed",
+    "numba",
+    "osmium",
+    "pettingzoo",
+    "pytest",
+    "ribs",
+}
 OPTIONAL |= {"traci"}  # libsumo brings it
 
 
