@@ -16,13 +16,15 @@ import json
 from collections.abc import Iterable, Sequence
 from functools import cache
 from itertools import chain, repeat
+from typing import Any
 
-from pydantic_core import to_json
+from pydantic import ConfigDict, TypeAdapter
 
 from cavsumo.model.bodies import Action
 from cavsumo.model.snapshot import Snapshot
 
 Numbers = Sequence[float]
+_JSON = TypeAdapter[Any](Any, config=ConfigDict(ser_json_inf_nan="constants"))
 
 
 def frames_text(frames: Iterable[Snapshot], actions: Iterable[Sequence[Action]] = ()) -> str:
@@ -92,7 +94,7 @@ def _key(name: str) -> str:
 
 def _written(groups: Sequence[Numbers]) -> list[str]:
     """Numbers that stand together as text, of each group."""
-    text = to_json(groups).decode()
+    text = _JSON.dump_json(groups).decode()
     if "N" in text or "I" in text:  # of NaN or Infinity
         odd = next(n for group in groups for n in group if not abs(n) < float("inf"))
         raise ValueError(f"a number of a frame is {odd}, which JSON does not have")
