@@ -22,7 +22,7 @@ from cavsumo.results.columns import COLUMNS
 from cavsumo.results.reading import HEADER
 from cavsumo.results.writing import Written
 
-NEEDLESS_ZERO = re.compile(rb"^0[0-9]", re.MULTILINE)
+NEEDLESS_ZERO = re.compile(rb"\n0[0-9]")  # of the number of a run
 READ = tuple(dict.fromkeys((*CHECKED, *COUNTED, "trace")))  # columns
 
 
@@ -62,7 +62,7 @@ def taken_up(csv_file: Path, todo: Iterator[int]) -> TakenUp | None:
 def _count(lines: LineBlock, todo: Iterator[int], tally: Tally) -> tuple[int, int]:
     """Check and count some rows; the number of the last, and how many have a trace."""
     lines.data.decode("utf-8")
-    if list(lines.columns) != list(COLUMNS) or NEEDLESS_ZERO.search(lines.data):
+    if list(lines.columns) != list(COLUMNS) or NEEDLESS_ZERO.search(b"\n" + lines.data):
         raise Doubtful
     table = lines.table(READ, ("run",))
     check_table(table)
