@@ -60,9 +60,10 @@ class ContactMonitor:
     def min_gap(self) -> float:
         """Smallest gap between the ego and a tester so far [m]; infinite without testers."""
         smallest = math.inf
-        for lower, ego, tester in self._close:
-            if lower < smallest:
-                smallest = min(smallest, gap(ego.box, tester.box))
+        for lower, ego, tester in sorted(self._close, key=_lower):
+            if lower >= smallest:
+                break
+            smallest = min(smallest, gap(ego.box, tester.box))
         return smallest
 
     def observe(self, snapshot: Snapshot) -> list[Contact]:
@@ -157,6 +158,11 @@ def depth(a: Box, b: Box) -> float:
             other_across - abs(dy * cb - dx * sb),
         ),
     )
+
+
+def _lower(candidate: tuple[float, BodyState, BodyState]) -> float:
+    """The lower bound of a gap."""
+    return candidate[0]
 
 
 def _meetings_among(testers: tuple[BodyState, ...]) -> list[Pair]:
