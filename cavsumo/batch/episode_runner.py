@@ -20,7 +20,7 @@ from cavsumo.model.objects import is_instance
 from cavsumo.model.scenario import Scenario
 from cavsumo.model.seeds import episode_seed
 from cavsumo.results.columns import Row, row_of
-from cavsumo.results.frame_text import frame_lines
+from cavsumo.results.frame_text import frames_text
 from cavsumo.results.rows import Outcome
 from cavsumo.results.trace_file import packed
 from cavsumo.results.traces import origin, trace_head, trace_text
@@ -174,7 +174,7 @@ class EpisodeRunner:
             return b""
         played = recorded(self.setup, episode, job.seed, episode.departures)
         first = trace_head(self._origin, row, memory, episode.frames, played)
-        return packed(trace_text(first, frame_lines(episode.frames, played.actions)))
+        return packed(trace_text(first, frames_text(episode.frames, played.actions)))
 
 
 def _recall(agents: Sequence[Agent]) -> Memory | None:

@@ -37,6 +37,11 @@ class Knowledge:
         self._prepared, self._unnoted = prepared, 0
         self.searches = {label: search_of(prepared, label) for label in prepared.cast.searchers}
 
+    @property
+    def looks_at_rows(self) -> bool:
+        """Whether any agent takes up recorded rows."""
+        return bool(self.names or self.searches)
+
     def seen(self, row: Row) -> None:
         """Take up a recorded row."""
         run, agent = int(row["run"]), row["agent"]

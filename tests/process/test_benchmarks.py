@@ -128,8 +128,8 @@ def test_branching(play: Play, capsys: pytest.CaptureFixture[str]) -> None:
     assert said.count("5 of 5 branches the same (0 errors), 1 of 1 episodes") == 2
     assert "refused  pedestrians" in said
     assert "by fork" in said
-    before, after = said.split("resources")[1].splitlines()[0].split(": ")[1].split("; ")
-    assert before.rpartition(",")[0] == after.rpartition(",")[0]
+    before, after, _ = said.split("before 2 branches: ")[1].splitlines()[0].split("; ")
+    assert before.rpartition(",")[0] == after.removeprefix("after: ").rpartition(",")[0]
     assert "verdicts the same" in said
 
 
