@@ -99,6 +99,20 @@ def test_un_r157(play: Play) -> None:
     assert line.split() == ["deceleration", "1,121", "0", "0"]
 
 
+def test_ast_crosswalk(play: Play) -> None:
+    """A few episodes of each starting point, and one draw of each in SUMO."""
+    lines = play("ast_crosswalk", "--episodes", "50", "--sumo", "1").splitlines()[1:]
+    assert [line.split()[0] for line in lines] == ["start-1", "start-2", "start-3"]
+    assert all("of 50" in line and line.endswith("alike 1") for line in lines)
+
+
+def test_street_suites(play: Play) -> None:
+    """One draw of each tester and number of pedestrians in one suite."""
+    lines = play("street_suites", "--suite", "chance-2019", "--draws", "1", "-j", "1").splitlines()
+    assert len(lines) == 17
+    assert lines[-1].split()[:3] == ["chance-2019", "election", "10"]
+
+
 def test_avoidable(play: Play) -> None:
     """One ego, one agent, both reference drivers."""
     said = play("avoidable", "--runs", "1", "-j", "1", EGOS=("constant",), AGENTS=("random",))
