@@ -24,6 +24,7 @@ class EvolutionSearch:
         self.space, self.rng = space, rng
         self._best, self._stale = -np.inf, 0
         self._strategy: Any = None  # not begun: the package takes a second to import
+        self._asked: Sequence[Any] = ()
         self._others: tuple[float, Point] | None = None  # the best point of another searcher
 
     def ask(self) -> list[Point]:
@@ -35,12 +36,13 @@ class EvolutionSearch:
 
     def tell(self, points: Sequence[Point], told: Sequence[PlayedPoint]) -> None:
         grades = [t.grade for t in told]
-        if self._strategy is None:
+        if not self._asked:
             i = int(np.argmax(grades))
             if self._others is None or grades[i] > self._others[0]:
                 self._others = grades[i], points[i]
             return
         self._strategy.tell(self._asked, [-g for g in grades])
+        self._asked = ()
         better = max(grades) > self._best + PROGRESS
         self._best = max(self._best, *grades)
         self._stale = 0 if better else self._stale + 1

@@ -16,12 +16,13 @@ from cavsumo.searchers.protocol import PlayedPoint, PointSpace, RandomSearch, Se
 from cavsumo.searchers.space import Point, Space
 from cavsumo.searchers.tree import TreeSearch
 
-FIRST = 3  # generations of known manoeuvres before the others take part
+FIRST = 2  # generations of known manoeuvres before the others take part
 FORGET = 0.8  # weight of what an earlier generation found
 SHARES = {
-    "manoeuvres": 1.0, "neighbours": 2.0, "cma": 0.3, "random": 0.3, "tree": 0.3, "explore": 0.3,
+    "manoeuvres": 1.0, "neighbours": 2.5, "cma": 0.3, "random": 0.2, "tree": 0.2, "explore": 0.2,
 }  # of the budget, while all find as much  # fmt: skip
-LISTENERS = ("neighbours", "tree", "explore")  # they learn from the points of others
+PER_FAILURE = 0.3  # worth of a failure like an earlier one; a new kind counts as one more
+HEIR = "neighbours"  # it goes on from what any member finds, so that is its worth too
 
 
 class Portfolio:
@@ -63,12 +64,14 @@ class Portfolio:
     def tell(self, points: Sequence[Point], told: Sequence[PlayedPoint]) -> None:
         self._generation += 1
         for name, member in self.members.items():
-            if name == self._turn or (name in LISTENERS and member.space == self.space):
+            if name == self._turn or member.space == self.space:
                 member.tell(points, told)
         fresh = {t.kind for t in told if t.failed} - self._kinds
         self._kinds |= fresh
-        gained = len(fresh) + 0.3 * sum(t.failed for t in told)
+        gained = len(fresh) + PER_FAILURE * sum(t.failed for t in told)
         self._worth[self._turn] = FORGET * self._worth[self._turn] + gained
+        if self._turn != HEIR and self.space == self.members[HEIR].space:
+            self._worth[HEIR] += gained
 
     def _chosen(self) -> str:
         """The searcher of the next generation: by chance, in proportion to its worth."""
