@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from cavsumo.errors import InputError
-from cavsumo.model.departures import Attributes, Demand, Stage, Trip, Walk
+from cavsumo.model.departures import Attributes, Demand, Entry, Stage, Trip, Walk
 
 WALKING = 2  # SUMO's number of the stage in which a person walks
 WAITING = 1  # and in which one waits
@@ -18,10 +18,13 @@ class DepartureNotes:
     Args:
         types: of the demand.
         apart: ids of those who are no background.
+        ego: the ego's entry, if it is another one than that of its route.
     """
 
-    def __init__(self, types: Mapping[str, Attributes], apart: frozenset[str]) -> None:
-        self._types, self._apart = types, apart
+    def __init__(
+        self, types: Mapping[str, Attributes], apart: frozenset[str], ego: Entry | None = None
+    ) -> None:
+        self._types, self._apart, self._ego = types, apart, ego
         self._trips: list[Trip] = []
         self._walks: list[Walk] = []
 
@@ -38,7 +41,7 @@ class DepartureNotes:
         """All of them, with the types that they are of."""
         used = {trip.type for trip in self._trips} | {walk.type for walk in self._walks}
         types = {name: type_ for name, type_ in self._types.items() if name in used}
-        return Demand(tuple(self._trips), tuple(self._walks), types)
+        return Demand(tuple(self._trips), tuple(self._walks), types, self._ego)
 
 
 def _trip(vehicle: Any, now: float, name: str) -> Trip:
