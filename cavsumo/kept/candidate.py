@@ -7,7 +7,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 from cavsumo.agents.recorded import Recorded
-from cavsumo.kept.motion import TesterMotion
+from cavsumo.kept.motion import BodyMotion
 from cavsumo.model.bodies import Kind
 from cavsumo.model.carriageway import StartRecord
 from cavsumo.model.departures import Attributes, Demand, Entry, Trip, Walk
@@ -50,7 +50,7 @@ class Candidate:
     """
 
     numbers: tuple[int, ...]
-    motions: tuple[TesterMotion, ...]
+    motions: tuple[BodyMotion, ...]
     waited: tuple[StartRecord, ...] = ()
     trips: tuple[Trip, ...] = ()
     walks: tuple[Walk, ...] = ()
@@ -113,7 +113,7 @@ def as_recorded(recorded: Recorded) -> Candidate:
     there = recorded.departures or Demand()
     bodies = range(len(recorded.starts))
     motions = [
-        TesterMotion(recorded.starts[i], actions=tuple(joint[i] for joint in recorded.actions))
+        BodyMotion(recorded.starts[i], actions=tuple(joint[i] for joint in recorded.actions))
         for i in bodies
     ]
     waited, ego = tuple(recorded.waited), there.ego

@@ -33,7 +33,7 @@ class MotionLeg(NamedTuple):
 
 
 @dataclass(frozen=True)
-class TesterMotion:
+class BodyMotion:
     """The motion of a tester.
 
     Attributes:
@@ -61,7 +61,7 @@ class TesterMotion:
             return self.actions[:steps]
         return _driven(self, kind, dt)[:steps] if steps <= LONGEST else ()
 
-    def later(self, pose: Sequence[float], steps: int) -> TesterMotion:
+    def later(self, pose: Sequence[float], steps: int) -> BodyMotion:
         """The motion from a timestep on, at which the body has a pose."""
         x, y, v, o = pose
         start = self.start._replace(x=x, y=y, v=v, o=o)
@@ -81,7 +81,7 @@ def _rounded(action: Action) -> tuple[float, float]:
 
 
 @lru_cache(maxsize=256)
-def _driven(motion: TesterMotion, kind: Kind, dt: float) -> tuple[Action, ...]:
+def _driven(motion: BodyMotion, kind: Kind, dt: float) -> tuple[Action, ...]:
     """The actions of a motion in legs."""
     start, body = motion.start, Body("", kind)
     state = BodyState(body, start.x, start.y, start.v or 0.0, start.o)
@@ -124,7 +124,7 @@ class TrackToViolation(NamedTuple):
         return len(self.track) - 1
 
 
-def in_legs(motion: TesterMotion, met: TrackToViolation) -> list[TesterMotion]:
+def in_legs(motion: BodyMotion, met: TrackToViolation) -> list[BodyMotion]:
     """Motions in one leg and in two that lead to the same place at the same time.
 
     Those in one leg first, straight ones before those along the track.
@@ -169,7 +169,7 @@ def _speeds(met: TrackToViolation) -> list[float]:
 
 def _one_leg(
     start: StartRecord, met: TrackToViolation, way: _WayThere, speed: float
-) -> list[TesterMotion]:
+) -> list[BodyMotion]:
     """Moving at one speed from the beginning on."""
     along = way.path.length - speed * met.end * met.dt
     return [_motion(start, way, along, (MotionLeg(0, speed),))] if along >= 0.0 else []
@@ -177,7 +177,7 @@ def _one_leg(
 
 def _two_legs(
     start: StartRecord, met: TrackToViolation, way: _WayThere, speed: float
-) -> list[TesterMotion]:
+) -> list[BodyMotion]:
     """Standing, and then moving at one speed."""
     if speed <= 0.0:
         return []
@@ -205,7 +205,7 @@ def _places(met: TrackToViolation, way: _WayThere) -> list[float]:
 
 def _motion(
     start: StartRecord, way: _WayThere, along: float, legs: tuple[MotionLeg, ...]
-) -> TesterMotion:
+) -> BodyMotion:
     """A motion in legs that starts at an arc length of a way."""
     x, y, o = way.path.at(along)
-    return TesterMotion(start._replace(x=x, y=y, o=o, v=legs[0].speed), legs, way.points)
+    return BodyMotion(start._replace(x=x, y=y, o=o, v=legs[0].speed), legs, way.points)

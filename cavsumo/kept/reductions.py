@@ -11,7 +11,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 from cavsumo.kept.candidate import Candidate, FixedPart, of_testers
-from cavsumo.kept.motion import MotionLeg, TesterMotion, TrackToViolation, in_legs
+from cavsumo.kept.motion import BodyMotion, MotionLeg, TrackToViolation, in_legs
 from cavsumo.kept.shrinking import subsets
 from cavsumo.model.bodies import NOOP
 from cavsumo.model.departures import Entry, Trip, Walk
@@ -107,7 +107,7 @@ class Reductions:
             ):
                 yield _with_motion(candidate, place, simpler)
 
-    def _simpler(self, motion: TesterMotion, met: TrackToViolation) -> Iterator[TesterMotion]:
+    def _simpler(self, motion: BodyMotion, met: TrackToViolation) -> Iterator[BodyMotion]:
         """Motions in fewer segments, or on a straighter way."""
         yield from in_legs(motion, met)
         for i in range(len(motion.legs)):
@@ -142,14 +142,14 @@ class Reductions:
                 yield replace(candidate, entry=Entry(edge, lane, along, round(speed, digits)))
 
 
-def _with_motion(candidate: Candidate, place: int, motion: TesterMotion) -> Candidate:
+def _with_motion(candidate: Candidate, place: int, motion: BodyMotion) -> Candidate:
     """A candidate with another motion of one tester."""
     motions = list(candidate.motions)
     motions[place] = motion
     return replace(candidate, motions=tuple(motions))
 
 
-def _without_leg(motion: TesterMotion, i: int) -> TesterMotion:
+def _without_leg(motion: BodyMotion, i: int) -> BodyMotion:
     """A motion without a leg: the one before it lasts, or the next begins at once."""
     left = [leg for j, leg in enumerate(motion.legs) if j != i]
     if not left:
@@ -181,7 +181,7 @@ def _later(candidate: Candidate, steps: int, tracks: Tracks, dt: float) -> Candi
     )
 
 
-def _rounder(motion: TesterMotion, dt: float) -> Iterator[TesterMotion]:
+def _rounder(motion: BodyMotion, dt: float) -> Iterator[BodyMotion]:
     """A motion with one rounder number."""
     start, second = motion.start, max(1, round(1.0 / dt))
     for digits in PLACES:
@@ -201,7 +201,7 @@ def _rounder(motion: TesterMotion, dt: float) -> Iterator[TesterMotion]:
             yield _leg(motion, i, MotionLeg(step, round(speed, digits)))
 
 
-def _leg(motion: TesterMotion, i: int, leg: MotionLeg) -> TesterMotion:
+def _leg(motion: BodyMotion, i: int, leg: MotionLeg) -> BodyMotion:
     """A motion with another leg; the start has the speed of the first."""
     legs = (*motion.legs[:i], leg, *motion.legs[i + 1 :])
     start = motion.start._replace(v=leg.speed) if i == 0 else motion.start

@@ -1,8 +1,8 @@
 """Kept tests against another ego: does it still fail, does it pass now, or does it meet nobody?
 
 The testers do what was recorded, or set off when the ego is where it was when they set off. The
-assertion ``standing`` is asserted too, so the episode goes on after a passed test, and an ego that
-stops for ever is not taken for one that copes.
+assertion ``standing`` is asserted too, so the episode goes on after a passed test until the ego has
+arrived or the time is over, and an ego that stops for ever is not taken for one that copes.
 """
 
 from __future__ import annotations
@@ -23,10 +23,11 @@ from cavsumo.batch.trust import check_trust
 from cavsumo.batch.worker import play
 from cavsumo.errors import InputError, UnknownName
 from cavsumo.kept.cavtest import KeptTest, read_cavtest
+from cavsumo.kept.standing import has_reason_to_stand
 from cavsumo.model.polyline import Path as Polyline
 from cavsumo.model.scenario import Params
-from cavsumo.results.rows import cell, verdicts_of
-from cavsumo.results.traces import Trace
+from cavsumo.results.rows import Outcome, cell, verdicts_of
+from cavsumo.results.traces import Trace, trace_of
 
 STANDING = "standing"  # the assertion that tells an ego that stops for ever
 FAILS, PASSES, ELSEWHERE = "still fails", "passes now", "no longer meets"
@@ -34,6 +35,7 @@ STANDS, ERROR = "stands still", "error"
 STATUSES = (FAILS, STANDS, ELSEWHERE, PASSES, ERROR)
 RECORDED, POLICY = "recorded", "policy"  # what the testers follow
 TESTERS = (RECORDED, POLICY)
+STOOD = "stood"  # in the column ``frozen``
 STOOD_MPS = 1e-3  # slower than this a tester stands
 
 
@@ -111,8 +113,7 @@ def regressions(
     with local_executor(jobs) as executor:
         asked = [executor.submit(play, one.batch, one.job) for one in prepared]
         for one, answer in zip(prepared, asked, strict=True):
-            row = answer.result().outcome.row
-            found.append(_told(one.test, {name: cell(value) for name, value in row.items()}))
+            found.append(_told(one, answer.result().outcome))
             notice(len(found))
     return found
 
@@ -136,7 +137,7 @@ def _prepared(file: Path, ego: OtherEgo) -> _Prepared:
     recorded = recording_of(test.record, test.record.trace)
     if ego.testers == POLICY:
         recorded = _holding(recorded, test.record.trace, batch.site.route.path)
-    job = Job(there.run, AGAIN, recorded.seed, recorded=recorded, briefly=True)
+    job = Job(there.run, AGAIN, recorded.seed, record=True, recorded=recorded, briefly=True)
     return _Prepared(test, batch, job)
 
 
@@ -154,18 +155,24 @@ def _holding(recorded: Recorded, trace: Trace, path: Polyline) -> Recorded:
     return dataclasses.replace(recorded, holds=holds)
 
 
-def _told(test: KeptTest, row: Mapping[str, str]) -> Regression:
+def _told(one: _Prepared, outcome: Outcome) -> Regression:
     """The result of a test from its episode."""
-    status, told = judged(test.record.row, row)
-    return Regression(test.record.file, test.sentence, status, told, row)
+    record, trace = one.test.record, trace_of(outcome)
+    row = {name: cell(value) for name, value in outcome.row.items()}
+    stands = False
+    if trace is not None and row["frozen"] == STOOD:
+        stands = not has_reason_to_stand(trace, one.batch.site)
+    status, told = judged(record.row, row, stands=stands)
+    return Regression(record.file, one.test.sentence, status, told, row)
 
 
-def judged(was: Mapping[str, str], row: Mapping[str, str]) -> tuple[str, str]:
+def judged(was: Mapping[str, str], row: Mapping[str, str], *, stands: bool) -> tuple[str, str]:
     """The status of a test, and why.
 
     Args:
         was: the row of the test.
         row: that of the same test with another ego.
+        stands: whether the ego stood for long at the end, without a reason.
     """
     if row["outcome"] == "error":
         return ERROR, row["error"]
@@ -175,7 +182,7 @@ def judged(was: Mapping[str, str], row: Mapping[str, str]) -> tuple[str, str]:
         return FAILS, _violated(row, name)
     if row["outcome"] == "invalid":
         return ELSEWHERE, f"a tester broke a rule of the world: {row['breach']}"
-    if said.get(STANDING) == VIOLATED and name != STANDING:
+    if stands or (said.get(STANDING) == VIOLATED and name != STANDING):
         return STANDS, "the ego stands without reason and does not drive on"
     if verdict == HELD:
         return PASSES, f"{name} was triggered by {row['tester'] or 'the situation'} and held"

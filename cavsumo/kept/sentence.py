@@ -7,7 +7,7 @@ from collections.abc import Mapping
 
 from cavsumo.batch.sentences import driver, many
 from cavsumo.kept.candidate import Candidate
-from cavsumo.kept.motion import TesterMotion
+from cavsumo.kept.motion import BodyMotion
 from cavsumo.model.bodies import WALKING
 from cavsumo.model.scenario import BatchPlan
 
@@ -39,7 +39,7 @@ def in_words(plan: BatchPlan, row: Mapping[str, str], candidate: Candidate) -> s
     )
 
 
-def _tester(name: str, motion: TesterMotion, dt: float, kind: str) -> str:
+def _tester(name: str, motion: BodyMotion, dt: float, kind: str) -> str:
     """The motion of a tester in words."""
     start = f"{name} at ({motion.start.x:.6g}, {motion.start.y:.6g})"
     if not motion.legs:
