@@ -8,7 +8,8 @@ page.html           the replay page
 ==================  ===============================================================================
 
 The bytes depend on the content alone. Files come from strangers: nothing but these names is read,
-each up to a size, and an ego or an assertion that the trace names is used as ``batch.trust`` says.
+each up to a size. An ego or an assertion that the trace names is used as ``batch.trust`` says, and
+SUMO gets no input that may name files (``strangers``).
 """
 
 from __future__ import annotations
@@ -31,6 +32,7 @@ from typing import Any
 from cavsumo.batch.located import located
 from cavsumo.batch.replay import Record, recorded_alone
 from cavsumo.errors import InputError, ResultsError, shown
+from cavsumo.kept.strangers import check_inputs
 from cavsumo.model.checksums import checksum
 from cavsumo.model.documents import json_of
 from cavsumo.model.own_folders import OwnFolder
@@ -144,13 +146,15 @@ def _inputs(record: Record) -> dict[str, bytes]:
 def read_cavtest(file: Path, allowed: Collection[str] | None = ()) -> KeptTest:
     """The test in a file; raises ResultsError in one sentence for one that is damaged or foreign.
 
-    ``allowed``: the external egos and assertions that it may use; None for all (``batch.trust``).
+    ``allowed``: the external egos and assertions that it may use; None for all (``batch.trust``),
+    and for inputs with which SUMO does more than to simulate (``strangers``).
     """
     folder = unpacked(file)
-    record = recorded_alone(folder / TRACE, allowed, anew=False)
-    record = located(record)
-    record = dataclasses.replace(record, file=file)
-    return KeptTest(record, _about(file, folder))
+    about = _about(file, folder)
+    record = located(recorded_alone(folder / TRACE, allowed, anew=False))
+    if allowed is not None:
+        check_inputs(record, file)
+    return KeptTest(dataclasses.replace(record, file=file), about)
 
 
 def _about(file: Path, folder: Path) -> dict[str, Any]:

@@ -330,3 +330,25 @@ def test_the_plugin_of_pytest(kept: Path, words: list[str], said: str) -> None:
     if "failed" in said:
         assert "still fails: reaction-zone was violated" in done.stdout
         assert "Traceback" not in done.stdout
+
+
+@pytest.mark.parametrize(
+    ("inside", "said"),
+    [
+        ('<poi id="p" x="0" y="0" imgFile="x"/>', "its network holds 'poi'"),
+        ('<param key="device.ssm.FILE" value="x"/>', "the parameter 'device.ssm.FILE'"),
+    ],
+)
+def test_sumo_writes_nothing_for_a_stranger(
+    networks: dict[str, Path], tmp_path: Path, inside: str, said: str
+) -> None:
+    """A network that names a file is refused; with --trust it is played."""
+    text = networks["pedestrians"].read_text(encoding="utf-8")
+    assert text.count("</net>") == 1
+    (tmp_path / "mine.net.xml").write_text(text.replace("</net>", f"{inside}</net>"))
+    words = ["run", "--net", "mine.net.xml", "--runs", "1", "--trace", "all", "-o", "a.csv", "-q"]
+    assert command(tmp_path, *words, "--exit-zero").returncode == 0
+    assert command(tmp_path, "keep", "a.csv", "0", "-o", "a.cavtest").returncode == 0
+    done = command(tmp_path, "replay", "a.cavtest")
+    assert (done.returncode, said in done.stderr) == (Exit.USAGE, True), done.stderr
+    assert command(tmp_path, "replay", "a.cavtest", "--trust").returncode == 0
