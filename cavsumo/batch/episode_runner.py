@@ -24,7 +24,7 @@ from cavsumo.results.frame_text import frames_text
 from cavsumo.results.rows import Outcome
 from cavsumo.results.trace_file import packed
 from cavsumo.results.traces import origin, trace_head, trace_text
-from cavsumo.simulation.avoidability import AvoidabilityCheck
+from cavsumo.simulation.avoidability import Avoidability, AvoidabilityCheck, preventable
 from cavsumo.simulation.checkpoints import begun
 from cavsumo.simulation.episode import Episode
 from cavsumo.simulation.loop import EpisodeLoop, played_on
@@ -132,6 +132,8 @@ class EpisodeRunner:
                 reference, ideal = (
                     REFERENCES.make(name, {}) for name in (self.plan.reference, IDEAL)
                 )
+                if job.briefly:
+                    avoidability = Avoidability(preventable(check(episode), reference))
                 if checkpoint is not None:
                     beat()
                     avoidability = checkpoint.judged(episode, reference, ideal)

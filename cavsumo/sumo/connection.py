@@ -93,7 +93,8 @@ class Simulations:
             self._sumo.start(self.command(seed, routes))
         self.set_light()
         route = self._site.route
-        self._sumo.route.add("cavsumo_ego", list(route.edges))
+        first = 0 if demand is None or demand.ego is None else demand.ego.edge
+        self._sumo.route.add("cavsumo_ego", list(route.edges[first:]))
         self._sumo.route.add("cavsumo_tester", [route.edges[0]])
 
     def advance(self) -> None:

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from cavsumo.errors import InputError
-from cavsumo.model.departures import Attributes, Demand, Stage, Trip, Walk
+from cavsumo.model.departures import Attributes, Demand, Entry, Stage, Trip, Walk
 from cavsumo.sumo.calls import direct
 
 WALKING = 2  # SUMO's number of the stage in which a person walks
@@ -21,12 +21,19 @@ class DepartureNotes:
         types: of the demand.
         apart: ids of those who are no background.
         dt: length of a timestep [s].
+        ego: the ego's entry, if it is another one than that of its route.
     """
 
     def __init__(
-        self, sumo: Any, types: Mapping[str, Attributes], apart: frozenset[str], dt: float
+        self,
+        sumo: Any,
+        types: Mapping[str, Attributes],
+        apart: frozenset[str],
+        dt: float,
+        ego: Entry | None = None,
     ) -> None:
         self._sumo, self._types, self._apart, self._dt = sumo, types, apart, dt
+        self._ego = ego
         self._vehicles = direct(sumo.simulation, "getDepartedIDList")
         self._persons = direct(sumo.simulation, "getDepartedPersonIDList")
         self._trips: list[Trip] = []
@@ -49,7 +56,7 @@ class DepartureNotes:
         """All of them, with the types that they are of."""
         used = {trip.type for trip in self._trips} | {walk.type for walk in self._walks}
         types = {name: type_ for name, type_ in self._types.items() if name in used}
-        return Demand(tuple(self._trips), tuple(self._walks), types)
+        return Demand(tuple(self._trips), tuple(self._walks), types, self._ego)
 
 
 def _trip(vehicle: Any, time: float, name: str) -> Trip:

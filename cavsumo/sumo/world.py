@@ -147,7 +147,7 @@ class World:
             self.simulations.begin(seed, demand)
             if note:
                 self._departures = self._notes(demand, states)
-            self._moved.insert(states, starts)
+            self._moved.insert(states, starts, None if demand is None else demand.ego)
             self._enter(states, guided)
             self._vehicles = tuple(make_room(self._vehicles, states, starts))
         self._states = tuple(states)
@@ -300,7 +300,9 @@ class World:
         """Where to note who departs; None when departures do not tell all of the demand."""
         types = self.simulations.types_told if demand is None else demand.types
         mine = frozenset((EGO, *(state.id for state in states)))
-        return None if types is None else DepartureNotes(libsumo, types, mine, self.dt)
+        if types is None:
+            return None
+        return DepartureNotes(libsumo, types, mine, self.dt, demand.ego if demand else None)
 
     @property
     def departures(self) -> Demand | None:
