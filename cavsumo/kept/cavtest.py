@@ -116,7 +116,7 @@ def _zipped(record: Record, page: str, about: Mapping[str, Any]) -> bytes:
 
 def _text(trace: Trace) -> str:
     """The text of a trace."""
-    return trace_text(trace.head, (json.dumps(frame) + "\n" for frame in trace.frames))
+    return trace_text(trace.head, "".join(json.dumps(frame) + "\n" for frame in trace.frames))
 
 
 def _inputs(record: Record) -> dict[str, bytes]:
