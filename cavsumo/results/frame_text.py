@@ -13,9 +13,9 @@ numbers with an exponent differently.
 from __future__ import annotations
 
 import json
-from collections.abc import Iterable, Sequence
+from collections.abc import Collection, Iterable, Iterator, Sequence
 from functools import cache
-from itertools import chain, repeat
+from itertools import chain
 from typing import Any
 
 from pydantic import ConfigDict, TypeAdapter
@@ -24,6 +24,8 @@ from cavsumo.model.bodies import Action
 from cavsumo.model.snapshot import Snapshot
 
 Numbers = Sequence[float]
+NEXT, BETWEEN = "], ", "], ["  # behind a group of numbers, and up to the next
+UNLIKE = ("e", "0.0000")  # in numbers that Python may write in another way
 _JSON = TypeAdapter[Any](Any, config=ConfigDict(ser_json_inf_nan="constants"))
 
 
@@ -45,10 +47,10 @@ def frames_text(frames: Iterable[Snapshot], actions: Iterable[Sequence[Action]] 
             ("background", snapshot.raw_background),
         ):
             poses = {key(state[0].id): state[1:] for state in states}  # of one id the last
-            text.add_groups(f', "{name}": {{', poses.items(), "}")
+            text.add_groups(f', "{name}": {{', poses, poses.values(), "}")
         text.end += f', "lights": {json.dumps("".join(snapshot.lights))}'
         joint = next(joints, ())
-        text.add_groups(', "actions": [', zip(repeat("["), joint, strict=False), "]")
+        text.add_groups(', "actions": [', [f"{NEXT}["] * len(joint), joint, "]")
         text.end += "}\n"
     return text.joined()
 
@@ -71,15 +73,18 @@ class _Text:
         self._numbers.append(numbers)
         self.end = ""
 
-    def add_groups(self, opening: str, groups: Iterable[tuple[str, Numbers]], closing: str) -> None:
-        """Go on with groups of numbers, each behind a piece of text, which opens a bracket."""
-        pieces, numbers = self._pieces, self._numbers
-        before, after = self.end + opening, ""
-        for piece, group in groups:
-            pieces.append(before + piece)
-            numbers.append(group)
-            before, after = "], ", "]"
-        self.end = (after or before) + closing
+    def add_groups(
+        self, opening: str, pieces: Collection[str], numbers: Iterable[Numbers], closing: str
+    ) -> None:
+        """Go on with groups of numbers, each behind its piece, which ends the group before."""
+        if not pieces:
+            self.end += opening + closing
+            return
+        first = len(self._pieces)
+        self._pieces.extend(pieces)
+        self._numbers.extend(numbers)
+        self._pieces[first] = self.end + opening + self._pieces[first].removeprefix(NEXT)
+        self.end = "]" + closing
 
     def joined(self) -> str:
         """The whole text."""
@@ -88,19 +93,28 @@ class _Text:
 
 
 def _key(name: str) -> str:
-    """The text before the numbers of a body."""
-    return f"{json.dumps(name)}: ["
+    """The text before the numbers of a body, behind those of another one."""
+    return f"{NEXT}{json.dumps(name)}: ["
 
 
 def _written(groups: Sequence[Numbers]) -> list[str]:
     """Numbers that stand together as text, of each group."""
-    text = _JSON.dump_json(groups).decode()
+    text = _JSON.dump_json(groups).decode().replace(",", ", ")  # "[[1.0, 2.0], [3.0]]"
     if "N" in text or "I" in text:  # of NaN or Infinity
         odd = next(n for group in groups for n in group if not abs(n) < float("inf"))
         raise ValueError(f"a number of a frame is {odd}, which JSON does not have")
-    texts = text[2:-2].replace(",", ", ").split("], [")
-    if "e" in text or "0.0000" in text:
-        for i, found in enumerate(texts):
-            if "e" in found or "0.0000" in found:  # Python may write one of these another way
-                texts[i] = json.dumps(list(groups[i]))[1:-1]
+    texts = text.split(BETWEEN)
+    texts[0], texts[-1] = texts[0].removeprefix("[["), texts[-1].removesuffix("]]")
+    for mark in UNLIKE:
+        for i in _groups_with(mark, text):
+            texts[i] = json.dumps(list(groups[i]))[1:-1]
     return texts
+
+
+def _groups_with(mark: str, text: str) -> Iterator[int]:
+    """The numbers of the groups in which a mark stands, which stands in few."""
+    group, before, place = 0, 0, text.find(mark)
+    while place >= 0:
+        group, before = group + text.count(BETWEEN, before, place), place
+        yield group
+        place = text.find(mark, place + 1)

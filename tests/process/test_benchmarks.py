@@ -147,6 +147,15 @@ def test_branching(play: Play, capsys: pytest.CaptureFixture[str]) -> None:
     assert "verdicts the same" in said
 
 
+def test_budget(play: Play) -> None:
+    """Parts of a few episodes, which add up."""
+    said = play("budget", "--net", NET, "--testers", "1", "--episodes", "5")
+    parts, together = said.splitlines()[1:-1], said.splitlines()[-1]
+    total = numbers(together)[-1]
+    assert total > 0.0
+    assert sum(numbers(line)[-1] for line in parts) == pytest.approx(total, abs=0.05 * len(parts))
+
+
 def test_cav_gym(play: Play) -> None:
     """One episode a cell, and two of the timing tester."""
     said = play("cav_gym", "--runs", "1", "--timing-runs", "2")
