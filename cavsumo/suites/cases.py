@@ -76,6 +76,14 @@ class SuiteCases:
         case = {"net": self.net(cell.test.net), "ego_route": route, "end": end}
         return Scenario(**{**shared, **case, "script": script}).placed(base.places)
 
+    def runs_by_net(self) -> dict[str, list[int]]:
+        """The runs on each network."""
+        found: dict[str, list[int]] = {}
+        for run in range(len(self)):
+            net = str(self.net(self.cells[run % len(self.cells)].test.net))
+            found.setdefault(net, []).append(run)
+        return found
+
     def net(self, name: str) -> Path:
         """A network that the suite names: one of cavsumo's, or a file beside the suite's."""
         beside = self.folder / name

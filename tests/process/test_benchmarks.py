@@ -352,6 +352,14 @@ def test_suite_drivers(play: Play) -> None:
     assert second.split()[:4] == ["sumo:IDM/0", "1", "of", "1"]
 
 
+def test_drivers_table(play: Play) -> None:
+    """One driver, one case of each suite, one episode on one network."""
+    words = [NET, "--ego", "constant", "--ncap", "372", "--r157", "36941", "--runs", "1"]
+    _, _, line, _, head, _, by_test = play("drivers_table", *words, "--traffic", "0").splitlines()
+    assert line.startswith("| constant | 0 of 1 [0, 79 %] | 10.0 | ")
+    assert (head, by_test) == ("| ego | CPNA |", "| constant | 0/1, 10 |")
+
+
 def test_ssm(play: Play) -> None:
     """It has no size: all encounters."""
     assert len(play("ssm").splitlines()) > 3

@@ -226,6 +226,20 @@ def test_a_report_and_junit_know_the_cases(played: cavsumo.Results) -> None:
     assert (done.returncode, "holds scripted tests" in done.stderr) == (2, True)
 
 
+def test_a_report_of_two_networks_has_pages_of_both(tmp_path: Path) -> None:
+    """A map of each, and pages that show each case on its own network and way."""
+    how: dict[str, Any] = {"only": ["CPNA/60/50", "CCFtap/10/45", "CCFtap/20/30"]}
+    cavsumo.suite(NAME, "constant", progress=False, output=tmp_path / "a.csv", **how)
+    words = ["report", "a.csv", "--html", "r.html", "--replays", "3", "-o", "r.txt"]
+    done = command(tmp_path, *words)
+    assert (done.returncode, "No replay pages" in done.stderr) == (0, False), done.stderr
+    pages = sorted(page.name for page in (tmp_path / "r_replays").iterdir())
+    assert pages == ["run000000.html", "run000001.html", "run000002.html"]
+    text = (tmp_path / "r.html").read_text(encoding="utf-8")
+    assert "proving-road" in text
+    assert "proving-crossing" in text
+
+
 def test_a_case_of_a_suite_that_is_gone_is_replayed_from_its_trace(tmp_path: Path) -> None:
     """The file of the user's own suite is not needed for a run with a trace."""
     file = tmp_path / "mine.toml"
