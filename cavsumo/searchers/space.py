@@ -187,12 +187,14 @@ class Space:
     ) -> tuple[Place, Programme | None]:
         """The place and the programme of a further body."""
         shares, company = self._shares(point, body), self.share(point, body, "company")
-        places: Sequence[Place] = self.movements.suited(shares)
         reaction, zone = self.share(point, body, "reaction"), shares["zone"]
-        if company >= TOGETHER:
-            places = [p for p in self.movements.places if abs(p.along - taken[0].along) <= NEAR_M]
+        near = company >= TOGETHER
+        if near:
             moment = self.share(point, 0, "zone") + MOMENTS * (zone - 0.5)
             shares["zone"] = min(1.0, max(0.0, moment))
+        places: Sequence[Place] = self.movements.suited(shares)
+        if near:
+            places = _near(taken[0], places) or _near(taken[0], self.movements.places)
         place, programme = self._free(shares, places, taken)
         if reaction >= AS_IT_BRAKES:
             cue = BRAKES if reaction < AS_IT_SPEEDS_UP else SPEEDS_UP
@@ -213,6 +215,11 @@ class Space:
             if self.movements.fits(place, taken):
                 return place, programme
         raise NetworkError(f"{self.site.net}: no room for {self.bodies} testers: use fewer")
+
+
+def _near(first: Place, places: Sequence[Place]) -> list[Place]:
+    """The places where a body acts together with one that starts at the first place."""
+    return [place for place in places if abs(place.along - first.along) <= NEAR_M]
 
 
 def _third(share: float) -> int:
