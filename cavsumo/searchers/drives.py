@@ -31,8 +31,9 @@ LEADS = 16  # places on an approach: how much earlier than the ego a vehicle arr
 MOST_LEAD_S = 6.0  # one that arrives early waits at its line
 SLOWEST_MPS = 1.0
 # Where an ego that does not react would be as a vehicle meets it: of one that crosses its way, of
-# one that stops in it, and of one that first waits for the ego, or is followed by it.
+# one that stops in it, of one that first waits for the ego, and of one that is followed by it.
 ZONES, STOPPING_ZONES, WAITING_ZONES = (-0.8, 2.0), (-0.8, 4.0), (-0.8, 6.0)
+FOLLOWED_ZONES = (0.0, 2.0)  # an ego keeps a distance to a vehicle ahead
 DEPTHS_M = (-3.0, 4.0)
 THROUGH = 0.6  # share of the number "depth" from which on a vehicle does not stop
 ONCOMING_RAD, ALONG_RAD = math.radians(135.0), math.radians(45.0)
@@ -147,9 +148,11 @@ def _from_line(approach: Approach, drive: DriveProgramme) -> float:
 
 def _zones(programme: DriveProgramme, crosses: bool) -> tuple[float, float]:
     """The zones in which a vehicle may begin."""
-    if crosses and (programme.depth is None or programme.hesitates):
+    if not crosses:
+        return FOLLOWED_ZONES
+    if programme.depth is None or programme.hesitates:
         return ZONES
-    return STOPPING_ZONES if crosses and (programme.depth or 0.0) >= 0.0 else WAITING_ZONES
+    return STOPPING_ZONES if programme.depth >= 0.0 else WAITING_ZONES
 
 
 def drives_at(site: Site, kind: Kind, ego: Kind, start_speed: float | None) -> Drives:
