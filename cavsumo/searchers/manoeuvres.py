@@ -68,9 +68,10 @@ MANOEUVRES: Mapping[str, Mapping[str, Mapping[str, Range]]] = {"walks": WALKS, "
 
 # Two that act together: ranges of the first and of the second.
 NEAR: Mapping[str, Range] = {"company": (TOGETHER, 1.0), "reaction": (0.0, AS_IT_BRAKES)}
+BEHIND: Mapping[str, Range] = {**NEAR, "place": (0.28, 0.36)}  # on the same side, 1 to 3.5 m on
 PAIRS: Mapping[str, Sequence[tuple[Mapping[str, Range], Mapping[str, Range]]]] = {
     "walks": (
-        (WALKS["hesitates"], {**NEAR, **WALKS["crosses"], "zone": (0.0, 0.6)}),
+        (WALKS["hesitates"], {**BEHIND, **WALKS["crosses"], "zone": (0.0, 0.6)}),
         (WALKS["waits on the road"], {**NEAR, **WALKS["crosses"], "zone": (0.0, 0.6)}),
         (WALKS["crosses"], {**NEAR, **WALKS["crosses slowly"], "zone": (0.1, 0.6)}),
         (WALKS["stands"], {**NEAR, **WALKS["comes towards"], "zone": (0.1, 0.6)}),
@@ -80,7 +81,7 @@ PAIRS: Mapping[str, Sequence[tuple[Mapping[str, Range], Mapping[str, Range]]]] =
         ),
     ),
     "drives": (
-        (DRIVES["hesitates"], {**NEAR, **DRIVES["does not stop"], "zone": (0.0, 0.6)}),
+        (DRIVES["hesitates"], {**BEHIND, **DRIVES["does not stop"], "zone": (0.0, 0.6)}),
         (DRIVES["creeps"], {**NEAR, **DRIVES["does not stop"], "zone": (0.0, 0.6)}),
         (
             {**DRIVES["does not stop"], "zone": EARLY},
