@@ -17,6 +17,8 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from cavsumo.agents.base import Agent as Agent
     from cavsumo.api.episodes import RecordedEpisode as RecordedEpisode
+    from cavsumo.api.kept import minimise as minimise
+    from cavsumo.api.kept import regress as regress
     from cavsumo.api.results import Results as Results
     from cavsumo.api.results import load as load
     from cavsumo.api.running import run as run
@@ -43,6 +45,8 @@ _PUBLIC = {
     "search": "api.running",
     "load": "api.results",
     "suite": "api.suites",
+    "minimise": "api.kept",
+    "regress": "api.kept",
     "Results": "api.results",
     "RecordedEpisode": "api.episodes",
     "Scenario": "model.scenario",

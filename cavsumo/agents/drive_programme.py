@@ -66,7 +66,7 @@ class ProgrammedDrive:
         approach = scene.starts[index].approach
         assert approach is not None
         chosen = programme and programmed_manoeuvre(approach.type, programme)
-        self.scene, self.programme = scene, programme
+        self.scene, self.index, self.programme = scene, index, programme
         self._driver = Driver(scene, index, "lawful", chosen)
         self._ego = EgoPrediction(scene, approach.ego_speed)
         self._reactions = EgoReactions()
@@ -75,6 +75,10 @@ class ProgrammedDrive:
             self._pause = Pause(programme)
             cue = programme.cue
             self._awaited = Awaited(cue, programme.delay) if isinstance(cue, str) else None
+
+    def reach(self, snapshot: Snapshot, state: BodyState) -> float:
+        """How far the vehicle may come from where it is, wherever it drives [m]."""
+        return state.body.kind.v_max * max(0.0, self.scene.horizon - snapshot.time)
 
     def action(self, snapshot: Snapshot, state: BodyState) -> Action:
         """The next action."""

@@ -33,13 +33,15 @@ AGENT_NAMES = Names(
         "proximity": "distance_m idle manoeuvre",
         "q-learning": "alpha gamma epsilon half_life hold_s weights learn",
         "random": "rate_per_s epsilon between",
-        "search": "method",
+        "search": "method earlier cut",
         "timing": "aim idle manoeuvre",
     },
 )
 
 SEARCH = "search"  # the agent whose tests a searcher chooses, by one of these methods
-SEARCH_METHODS = ("portfolio", "random", "manoeuvres", "neighbours", "cma")
+SEARCH_METHODS = (
+    "portfolio", "random", "manoeuvres", "neighbours", "cma", "diversity", "tree", "explore",
+)  # fmt: skip
 
 PREFIX = "policy:"
 

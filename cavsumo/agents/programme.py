@@ -22,6 +22,7 @@ from cavsumo.model.snapshot import BodyState, Snapshot
 
 LONGEST_WAIT_S = 8.0  # a body that waits for the ego on the road goes on after this time
 STOPPED_M = 0.05  # so near to the end of its leg a body has arrived
+ROUND_M = 2.0  # that a body's course is longer for turning and stopping
 BEYOND_M = 0.6  # so far beyond the edge of the carriageway a body stops
 
 
@@ -97,6 +98,21 @@ class ProgrammedWalk:
             speed = min(speed, stopping_speed(state.body.kind, self._to_go(state, programme), dt))
         wanted = walk(state, heading, speed, dt)
         return self._avoidance.across(snapshot, state, wanted, heading)
+
+    def reach(self, snapshot: Snapshot, state: BodyState) -> float:
+        """How far the body may come from where it is, detours around others apart [m]."""
+        if self.programme is None or self._met is None:
+            return ROUND_M + self._idle.left(state)
+        way, programme = self._met.way, self.programme
+        across = way.leave - way.enter + 2.0 * BEYOND_M
+        legs = (
+            (1, across / math.cos(programme.heading)),
+            (3, programme.length_2),
+            (4, across / max(1e-9, abs(math.cos(programme.heading_3)))),
+        )
+        ahead = sum(length for phase, length in legs if self._phase <= phase)
+        kind, left = state.body.kind, max(0.0, self.scene.horizon - snapshot.time)
+        return ROUND_M + min(ahead, kind.v_max * left)
 
     def _course(self, state: BodyState, programme: WalkProgramme) -> tuple[float, float]:
         """The heading [rad] and the speed [m/s] of the present phase."""

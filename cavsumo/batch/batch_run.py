@@ -18,10 +18,11 @@ from cavsumo.batch.stopping import stopping_rule
 from cavsumo.batch.tally import Tally
 from cavsumo.egos.ego_files import OutputWatch
 from cavsumo.errors import BatchError
-from cavsumo.results.reading import COMPLETE, check_cells, rows_of
+from cavsumo.results.reading import COMPLETE, STARTING, check_cells, rows_of
 from cavsumo.results.rows import Outcome
 from cavsumo.results.writing import Recorder
 
+LARGE = 8 << 20  # bytes from which rows are worth the import of pandas, which takes 0.4 s
 LOOK_AHEAD = 4  # episodes under way or waiting for their turn, for each that is played at a time
 
 
@@ -66,11 +67,26 @@ class BatchRun:
         """Take up the recorded rows."""
         self._todo = self.prepared.plan.todo()
         self._knowledge = Knowledge(self.prepared, manifest)
-        self.tally.add_rows(self._recorded(manifest))
+        if not self._taken_up(manifest):
+            self.tally.add_rows(self._recorded(manifest))
         self._knowledge.catch_up(self.executor)
         self.left_out = self.recorder.keep(self.prepared.inputs)
         recorded = manifest["status"]
         self.status = recorded if recorded in COMPLETE else "interrupted"
+
+    def _taken_up(self, manifest: Mapping[str, Any]) -> bool:
+        """Take up the rows of a large batch of which nobody needs each; whether that is done."""
+        csv_file, starting = self.recorder.csv_file, manifest["status"] == STARTING
+        if starting or self._knowledge.looks_at_rows or csv_file.stat().st_size < LARGE:
+            return False
+        from cavsumo.batch.resume_large import taken_up  # which imports pandas
+
+        found = taken_up(csv_file, self.prepared.plan.todo())
+        if found is None:
+            return False
+        self.recorder.resume_after(manifest, found.written)
+        self.tally, self._todo = found.tally, found.todo
+        return True
 
     def _recorded(self, manifest: Mapping[str, Any]) -> Iterator[Mapping[str, Any]]:
         """The recorded rows, checked, and seen by those who learn from them."""

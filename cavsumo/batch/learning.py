@@ -12,7 +12,7 @@ from typing import Any
 
 from cavsumo.batch.dispatch import run_batch
 from cavsumo.batch.prepared import PreparedBatch
-from cavsumo.batch.searching import Searching
+from cavsumo.batch.searches import search_of
 from cavsumo.batch.tally import Row
 
 CHECKPOINT_EVERY = 20  # learning episodes between two records of the knowledge
@@ -35,7 +35,12 @@ class Knowledge:
         self.after = {name: int(after.get(name, -1)) for name in self.names}
         self.owed: list[int] = []
         self._prepared, self._unnoted = prepared, 0
-        self.searches = {label: Searching(prepared, label) for label in prepared.cast.searchers}
+        self.searches = {label: search_of(prepared, label) for label in prepared.cast.searchers}
+
+    @property
+    def looks_at_rows(self) -> bool:
+        """Whether any agent takes up recorded rows."""
+        return bool(self.names or self.searches)
 
     def seen(self, row: Row) -> None:
         """Take up a recorded row."""
@@ -77,7 +82,7 @@ class Knowledge:
         for name in names:
             self.memories.pop(name, None)
             if name in self.searches:
-                self.searches[name] = Searching(self._prepared, name)
+                self.searches[name] = search_of(self._prepared, name)
 
     def facts(self) -> dict[str, Any]:
         """The knowledge, for the manifest."""

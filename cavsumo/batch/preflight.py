@@ -11,6 +11,7 @@ from typing import Any
 from cavsumo.batch.manner import Manner
 from cavsumo.batch.planned import PlannedBatch, planned
 from cavsumo.batch.prepared import OUTPUTS, PreparedBatch, manifest, prepare
+from cavsumo.batch.searches import check_earlier
 from cavsumo.errors import ResultsError
 from cavsumo.model.study import Part
 from cavsumo.results.provenance import differences
@@ -124,6 +125,7 @@ def _checked(batch: PlannedBatch) -> CheckedBatch:
         if label in prepared.cast.learners:
             source = f"manifest of {str(output)!r}: learned"
             prepared.cast.check_memory(label, learned, source)
+    check_earlier(prepared)
     return CheckedBatch(batch.name, output, prepared, now, recorded)
 
 

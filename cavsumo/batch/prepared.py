@@ -16,6 +16,7 @@ import numpy as np
 
 from cavsumo.agents.casting import Cast, resolve_cast, teams
 from cavsumo.agents.manoeuvres import types_for
+from cavsumo.agents.names import SEARCH_METHODS
 from cavsumo.assertions.specs import assertions_of
 from cavsumo.batch.plan_names import check_names
 from cavsumo.egos.base import Ego
@@ -34,6 +35,7 @@ from cavsumo.network.traffic import Volume
 from cavsumo.network.traffic_lights import Pace
 from cavsumo.results.present import input_files
 from cavsumo.results.provenance import checksums, traffic_checksum, unequal, versions
+from cavsumo.searchers.methods import check_method
 from cavsumo.searchers.space import Space, space_of
 from cavsumo.suites.cases import case_plan, case_plans, suite_inputs
 from cavsumo.sumo.options import OPTIONS
@@ -188,8 +190,8 @@ def _prepared(plan: BatchPlan, ego: Ego | None) -> PreparedBatch:
     objects = objects_among([*plan.cast.values(), scenario.ego, *scenario.assertions])
     where = str(Path.cwd()), _checksums(plan, cast), versions()
     prepared = PreparedBatch(plan, cast, site, *where, objects=objects)
-    if cast.searchers:
-        _ = prepared.space  # one without a start is refused
+    for label in sorted(cast.searchers):  # a space without a start is refused too
+        check_method(str(cast[label].params.get("method", SEARCH_METHODS[0])), prepared.space)
     return prepared
 
 

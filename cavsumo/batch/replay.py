@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 from cavsumo.batch.jobs import Job, Memory, job
 from cavsumo.batch.messages import Answer
 from cavsumo.batch.prepared import PreparedBatch, prepare
-from cavsumo.batch.searching import searched
+from cavsumo.batch.searches import searched
 from cavsumo.batch.trust import check_trust
 from cavsumo.batch.worker import Worker
 from cavsumo.errors import DivergenceError, ResultsError, shown

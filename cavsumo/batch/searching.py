@@ -9,22 +9,24 @@ from __future__ import annotations
 
 import math
 import zlib
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
+from cavsumo.agents.decisions import read
 from cavsumo.batch.jobs import Memory
 from cavsumo.batch.prepared import PreparedBatch
-from cavsumo.errors import ResultsError
 from cavsumo.results.grade import INVALID_GRADE
 from cavsumo.results.rows import cell
+from cavsumo.searchers.continued import ContinuedSearch
 from cavsumo.searchers.methods import searcher_of
-from cavsumo.searchers.protocol import PlayedPoint
+from cavsumo.searchers.protocol import PlayedPoint, PointSpace
 from cavsumo.searchers.space import Point
 from cavsumo.searchers.words import Failure, in_common
 
+TOLD = ("grade", "outcome", "avoidable", "tester", "situations")  # columns
 SPEED_BIN_MPS, PLACE_BIN_M = 2.0, 10.0  # failures within a bin are alike
 
 
@@ -56,19 +58,24 @@ class Searching:
 
     Attributes:
         label: of the agent.
+        searcher: of the points.
         space: the space of tests.
         points: those chosen so far, by the number of the agent's episode.
+        spaces: the space of each of them: the same, or that of its decisions.
     """
 
-    def __init__(self, prepared: PreparedBatch, label: str) -> None:
+    def __init__(self, prepared: PreparedBatch, label: str, first: Sequence[Point] = ()) -> None:
+        """``first``: points of the searcher's space to begin with."""
         plan = prepared.plan
         self.label, self._step = label, len(plan.agents)
         self._first = list(plan.cast).index(label)
         self.space = prepared.space
         seed = np.random.SeedSequence([plan.seed, zlib.crc32(label.encode())])
         method = str(prepared.cast[label].params.get("method", "portfolio"))
-        self._searcher = searcher_of(method, self.space, np.random.default_rng(seed))
+        searcher = searcher_of(method, self.space, np.random.default_rng(seed))
+        self.searcher = ContinuedSearch(searcher, first) if first else searcher
         self.points: list[Point] = []
+        self.spaces: list[PointSpace] = []
         self._generation: list[int] = []  # episodes of the points that were asked for last
         self._told: dict[int, PlayedPoint] = {}
         self._testers: dict[int, int] = {}  # the body that the verdict of an episode names
@@ -86,16 +93,24 @@ class Searching:
 
     def memory(self, run: int) -> Memory:
         """The memories with which the agents play an episode whose point is known."""
-        return self.space.memories(self.points[self._number(run)])
+        number = self._number(run)
+        return self.spaces[number].memories(self.points[number])
 
     def told(self, row: Mapping[str, Any]) -> None:
         """Take up the row of an episode, in any order."""
         run = int(row["run"])
         if self.ready(run):
             number = self._number(run)
-            self._told[number] = self._result(self.points[number], row)
+            self._told[number] = self._result(number, row)
             self._testers[number] = _body(cell(row["tester"]))
             self._lasted[number] = float(cell(row["time_s"]) or 0.0)
+
+    def best(self) -> list[tuple[PointSpace, Point]]:
+        """The points that were told, with their spaces: the best of each kind, then the others."""
+        ranked = sorted(self._told, key=lambda n: (-self._told[n].grade, n))
+        firsts = {self._told[n].kind: n for n in reversed(ranked)}
+        chosen = dict.fromkeys((*(n for n in ranked if n in firsts.values()), *ranked))
+        return [(self.spaces[n], self.points[n]) for n in chosen]
 
     def facts(self) -> SearchFacts:
         """The findings so far."""
@@ -104,7 +119,7 @@ class Searching:
         first = None
         if failed:
             first = failed[0] + 1, math.fsum(self._lasted[n] for n in numbers if n <= failed[0])
-        played = [self.points[n] for n in numbers]
+        played = [self.points[n] for n in numbers if self.spaces[n] is self.space]
         return SearchFacts(
             episodes=len(numbers),
             seconds=math.fsum(self._lasted.values()),
@@ -124,51 +139,35 @@ class Searching:
         """Tell the searcher of its last generation and ask it for the next."""
         if self._generation:
             points = [self.points[n] for n in self._generation]
-            self._searcher.tell(points, [self._told[n] for n in self._generation])
-        asked = self._searcher.ask()
+            self.searcher.tell(points, [self._told[n] for n in self._generation])
+        asked = self.searcher.ask()
         self._generation = list(range(len(self.points), len(self.points) + len(asked)))
         self.points += asked
-        if self._searcher.uniform:
+        self.spaces += [self.searcher.space] * len(asked)
+        if self.searcher.uniform:
             self._uniform.update(self._generation)
 
-    def _result(self, point: Point, row: Mapping[str, Any]) -> PlayedPoint:
+    def _result(self, number: int, row: Mapping[str, Any]) -> PlayedPoint:
         """The result of a point; a row of this session and one that was recorded tell the same."""
-        text = {key: cell(row[key]) for key in ("grade", "outcome", "avoidable", "tester")}
+        text = {key: cell(row[key]) for key in TOLD}
         grade = float(text["grade"]) if text["grade"] else INVALID_GRADE
         failed = text["outcome"] == "violated" and text["avoidable"] != "0" and grade >= 0.0
-        return PlayedPoint(
-            grade, failed, self._kind(point, _body(text["tester"]), grade) if failed else ()
-        )
+        kind = self._kind(number, _body(text["tester"]), grade) if failed else ()
+        return PlayedPoint(grade, failed, kind, tuple(read(text["situations"])))
 
     def _failure(self, number: int) -> Failure:
         """The body that the ego failed in an episode."""
-        point, body = self.points[number], self._testers[number]
-        place, programme = self.space.played(point)[body]
-        others = len(self.space.seen(point)) - (programme is not None)
+        played = self.spaces[number].played(self.points[number])
+        place, programme = played[self._testers[number]]
+        others = sum(one is not None for _, one in played) - (programme is not None)
         return Failure(place, programme, others)
 
-    def _kind(self, point: Point, body: int, impact: float) -> tuple[object, ...]:
+    def _kind(self, number: int, body: int, impact: float) -> tuple[object, ...]:
         """Impact speed, side and place of a failure, by which failures are alike."""
-        place = self.space.place(point, body)
+        place = self.spaces[number].place(self.points[number], body)
         return impact // SPEED_BIN_MPS, place.whence, place.along // PLACE_BIN_M
 
 
 def _body(tester: str) -> int:
     """The number of the body that a row names; the first one if it names none of the testers."""
     return int(tester.removeprefix("tester")) if tester.startswith("tester") else 0
-
-
-def searched(
-    prepared: PreparedBatch, label: str, rows: Iterable[Mapping[str, Any]], run: int
-) -> Memory:
-    """The memories with which the agents of a search played an episode, from the rows before it.
-
-    Raises ResultsError where rows are missing.
-    """
-    search = Searching(prepared, label)
-    for row in rows:
-        if row["agent"] == label and int(row["run"]) < run:
-            search.told(row)
-    if not search.ready(run):
-        raise ResultsError(f"run {run} cannot be found again: rows of the search before it miss")
-    return search.memory(run)

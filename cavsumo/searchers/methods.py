@@ -6,17 +6,30 @@ from collections.abc import Callable, Mapping
 
 import numpy as np
 
+from cavsumo.errors import InputError
+from cavsumo.model.bodies import WALKING
+from cavsumo.searchers.decision_space import DecisionSpace
+from cavsumo.searchers.diversity import DiversitySearch, check_installed
 from cavsumo.searchers.evolution import EvolutionSearch
+from cavsumo.searchers.explore import ExploreSearch
 from cavsumo.searchers.manoeuvres import ManoeuvreSearch
 from cavsumo.searchers.neighbours import NeighbourSearch
 from cavsumo.searchers.portfolio import Portfolio
 from cavsumo.searchers.protocol import RandomSearch, Searcher
 from cavsumo.searchers.space import Space
+from cavsumo.searchers.tree import TreeSearch
+
+BY_DECISIONS = ("tree", "explore")
 
 
 def _neighbours(space: Space, rng: np.random.Generator) -> Searcher:
     first, own = rng.spawn(2)
     return NeighbourSearch(space, own, ManoeuvreSearch(space, first))
+
+
+def _diversity(space: Space, rng: np.random.Generator) -> Searcher:
+    first, own = rng.spawn(2)
+    return DiversitySearch(space, own, ManoeuvreSearch(space, first))
 
 
 SEARCHERS: Mapping[str, Callable[[Space, np.random.Generator], Searcher]] = {
@@ -25,9 +38,23 @@ SEARCHERS: Mapping[str, Callable[[Space, np.random.Generator], Searcher]] = {
     "manoeuvres": ManoeuvreSearch,
     "neighbours": _neighbours,
     "cma": EvolutionSearch,
+    "diversity": _diversity,
+    "tree": lambda space, rng: TreeSearch(DecisionSpace(space), rng),
+    "explore": lambda space, rng: ExploreSearch(DecisionSpace(space), rng),
 }
 
 
 def searcher_of(method: str, space: Space, rng: np.random.Generator) -> Searcher:
     """The searcher of a method."""
     return SEARCHERS[method](space, rng)
+
+
+def check_method(method: str, space: Space) -> None:
+    """Raise InputError where a method cannot search a space."""
+    if method == "diversity":
+        check_installed()
+    if method in BY_DECISIONS and space.movements.kind.name not in WALKING:
+        raise InputError(
+            f"search.method {method}: decides for {' and '.join(WALKING)}s alone; choose another "
+            f"method for kind {space.movements.kind.name!r}"
+        )

@@ -6,14 +6,23 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from cavsumo.model.bodies import WALKING
+from cavsumo.searchers.decision_space import DecisionSpace
 from cavsumo.searchers.evolution import EvolutionSearch
+from cavsumo.searchers.explore import ExploreSearch
 from cavsumo.searchers.manoeuvres import ManoeuvreSearch
 from cavsumo.searchers.neighbours import NeighbourSearch
-from cavsumo.searchers.protocol import PlayedPoint, RandomSearch, Searcher
+from cavsumo.searchers.protocol import PlayedPoint, PointSpace, RandomSearch, Searcher
 from cavsumo.searchers.space import Point, Space
+from cavsumo.searchers.tree import TreeSearch
 
-FIRST = 3  # generations of known manoeuvres before the others take part
+FIRST = 2  # generations of known manoeuvres before the others take part
 FORGET = 0.8  # weight of what an earlier generation found
+SHARES = {
+    "manoeuvres": 1.0, "neighbours": 2.5, "cma": 0.3, "random": 0.2, "tree": 0.2, "explore": 0.2,
+}  # of the budget, while all find as much  # fmt: skip
+PER_FAILURE = 0.3  # worth of a failure like an earlier one; a new kind counts as one more
+HEIR = "neighbours"  # it goes on from what any member finds, so that is its worth too
 
 
 class Portfolio:
@@ -21,7 +30,7 @@ class Portfolio:
 
     def __init__(self, space: Space, rng: np.random.Generator) -> None:
         self.rng = rng
-        streams = iter(rng.spawn(4))
+        streams = iter(rng.spawn(6))
         known = ManoeuvreSearch(space, next(streams))
         self.members: dict[str, Searcher] = {
             "manoeuvres": known,
@@ -29,10 +38,19 @@ class Portfolio:
             "cma": EvolutionSearch(space, next(streams)),
             "random": RandomSearch(space, next(streams)),
         }
+        if space.movements.kind.name in WALKING:
+            decisions = DecisionSpace(space)
+            self.members["tree"] = TreeSearch(decisions, next(streams))
+            self.members["explore"] = ExploreSearch(decisions, next(streams))
         self._worth = dict.fromkeys(self.members, 1.0)
         self._generation = 0
         self._turn = "manoeuvres"
         self._kinds: set[tuple[object, ...]] = set()
+
+    @property
+    def space(self) -> PointSpace:
+        """The space of the last generation."""
+        return self.members[self._turn].space
 
     @property
     def uniform(self) -> bool:
@@ -46,18 +64,19 @@ class Portfolio:
     def tell(self, points: Sequence[Point], told: Sequence[PlayedPoint]) -> None:
         self._generation += 1
         for name, member in self.members.items():
-            if name in (self._turn, "neighbours"):
+            if name == self._turn or member.space == self.space:
                 member.tell(points, told)
         fresh = {t.kind for t in told if t.failed} - self._kinds
         self._kinds |= fresh
-        gained = len(fresh) + 0.3 * sum(t.failed for t in told)
+        gained = len(fresh) + PER_FAILURE * sum(t.failed for t in told)
         self._worth[self._turn] = FORGET * self._worth[self._turn] + gained
+        if self._turn != HEIR and self.space == self.members[HEIR].space:
+            self._worth[HEIR] += gained
 
     def _chosen(self) -> str:
         """The searcher of the next generation: by chance, in proportion to its worth."""
         if self._generation < FIRST:
             return "manoeuvres"
         names = list(self.members)
-        base = {"manoeuvres": 1.0, "neighbours": 2.0, "cma": 0.3, "random": 0.3}
-        weights = np.array([base[n] * (0.3 + self._worth[n]) for n in names])
+        weights = np.array([SHARES[n] * (0.3 + self._worth[n]) for n in names])
         return names[int(self.rng.choice(len(names), p=weights / weights.sum()))]

@@ -4,13 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import NamedTuple, Protocol
+from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 
+from cavsumo.agents.decisions import Situation
+from cavsumo.agents.searched import Programme
+from cavsumo.searchers.places import Place
 from cavsumo.searchers.space import Point, Space
 
 GENERATION = 10  # points that are chosen together, before any of them is played
+LOWEST_GRADE = -5.0  # of an invalid episode (``results.grade``); from 0 on are preventable failures
 
 
 class PlayedPoint(NamedTuple):
@@ -20,19 +24,41 @@ class PlayedPoint(NamedTuple):
         grade: how near it came to a preventable failure (``results.grade``).
         failed: whether it is a preventable failure.
         kind: of the failure; failures of one kind are alike.
+        situations: in which the decisions were taken, of a point of ``DecisionSpace``.
     """
 
     grade: float
     failed: bool
     kind: tuple[object, ...] = ()
+    situations: tuple[Situation, ...] = ()
+
+
+class PointSpace(Protocol):
+    """A space of tests, as those need it who play its points and speak about them."""
+
+    @property
+    def dimension(self) -> int: ...
+
+    def memories(self, point: Point) -> tuple[dict[str, Any], ...]:
+        """The memories with which the agents play a point."""
+
+    def place(self, point: Point, body: int) -> Place:
+        """Where a body starts."""
+
+    def played(self, point: Point) -> Sequence[tuple[Place, Programme | None]]:
+        """The place and the programme of every body, None for one that stands by."""
 
 
 class Searcher(Protocol):
     """Chooses the points of a generation from what came of those before.
 
     Attributes:
-        uniform: whether the points that were asked for last are uniform over the space.
+        space: of the points that were asked for last.
+        uniform: whether they are uniform over the space.
     """
+
+    @property
+    def space(self) -> PointSpace: ...
 
     @property
     def uniform(self) -> bool: ...
@@ -41,7 +67,7 @@ class Searcher(Protocol):
         """The points of the next generation."""
 
     def tell(self, points: Sequence[Point], told: Sequence[PlayedPoint]) -> None:
-        """Take up the results of a generation, which another searcher may have chosen."""
+        """Take up the results of a generation, which another searcher of the space may choose."""
 
 
 @dataclass

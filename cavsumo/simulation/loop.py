@@ -10,17 +10,19 @@ import math
 from collections.abc import Sequence
 
 from cavsumo.agents.base import Agent, Forecast
-from cavsumo.assertions.base import INVALID, VIOLATED, Judgement, weightiest
+from cavsumo.assertions.base import HELD, INVALID, UNFAIR, VIOLATED, Judgement, weightiest
 from cavsumo.assertions.blame import blamed
 from cavsumo.assertions.contacts import ContactMonitor
 from cavsumo.assertions.validity import ValidityMonitor
 from cavsumo.egos.base import Drive, Ego
 from cavsumo.model.bodies import Action
 from cavsumo.model.departures import Demand
+from cavsumo.model.left_behind import LeftBehind
 from cavsumo.model.snapshot import Snapshot
 from cavsumo.simulation.ego_progress import ego_progress
-from cavsumo.simulation.ending import at_end, over
+from cavsumo.simulation.ending import all_behind, at_end, over
 from cavsumo.simulation.episode import Episode, Joint
+from cavsumo.simulation.foresight import human_short
 from cavsumo.simulation.moving import moved
 from cavsumo.simulation.rewards import Feedback, RewardMonitor
 from cavsumo.simulation.setup import Setup
@@ -45,6 +47,8 @@ class EpisodeLoop:
         history: all states so far.
         ego_view, agent_views: the views of the ego and of each agent.
         over: whether it has ended.
+        measured: whether rewards, validity, naturalness and criticality are found from here on;
+            a rerun, which is played for its verdict alone, needs none of them.
     """
 
     def __init__(
@@ -68,10 +72,11 @@ class EpisodeLoop:
         self._episode = Episode(Judgement(""), starts=begun.starts, waited=begun.waited)
         self._episode.forecast = _foretold(agents, self.agent_views)
         self._validity = ValidityMonitor(self.scene)
+        self._behind = LeftBehind(self.scene)
         self.history: list[Snapshot] = self._episode.seen  # for blame, progress and grade
         self._chosen: list[Joint] = []
         self._keep(record or keep)
-        self._arrived = False
+        self._arrived, self._cut, self.measured = False, False, True
         self._learners = _learn(agents)
         self._observe(self.snapshot)
         self._end(over(setup, self.snapshot))
@@ -99,13 +104,16 @@ class EpisodeLoop:
         if braking > episode.max_decel:
             episode.max_decel = braking
         self._observe(successor)
-        judgements = [a.judgement for a in setup.assertions]
-        rewards = self._rewards.rewards(successor, judgements, self._validity.breaches)
+        rewards = self._rewarded(successor) if self.measured else None
         self._show(successor)
         if self._learners:
             _feed_back(agents, views, actions, rewards, self.agent_views)
         self.snapshot = successor
-        self._end(over(setup, successor))
+        ended = over(setup, successor)
+        self._cut = not (ended or episode.drives) and all_behind(
+            setup, agents, self._behind, successor
+        )
+        self._end(ended or self._cut)
         return rewards
 
     def hand_over(
@@ -171,14 +179,22 @@ class EpisodeLoop:
         episode.rms_acceleration = episode.naturalness.rms_acceleration(
             episode.steps, self.scene.dt
         )
+        episode.notes = self._agents[0].notes() if self._agents else ""
         spoilt = self._validity.spoils(episode.judgement)
         late = self.snapshot.time >= self.setup.scenario.end - 1e-9
         arrived = True if self._arrived else False if late else None
-        episode.progress = ego_progress(self.scene, self.history, arrived)
+        episode.progress = ego_progress(self.scene, self.history, arrived, cut=self._cut)
         episode.invalid, episode.breach = spoilt is not None, spoilt or self._validity.first
         if episode.outcome == VIOLATED:
             episode.blame = blamed(self.scene, self.history, episode.judgement)
+        elif self.measured and episode.outcome in (HELD, UNFAIR):
+            episode.short = human_short(self.scene, self.history, episode.judgement)
         return episode
+
+    def _rewarded(self, successor: Snapshot) -> Feedback | None:
+        """The agents' rewards for a timestep."""
+        judgements = [a.judgement for a in self.setup.assertions]
+        return self._rewards.rewards(successor, judgements, self._validity.breaches)
 
     def _observe(self, snapshot: Snapshot) -> None:
         """Show a snapshot to the monitors and the assertions.
@@ -187,10 +203,11 @@ class EpisodeLoop:
         """
         episode, assertions = self._episode, self.setup.assertions
         contacts = episode.contacts.observe(snapshot)
-        if VIOLATED not in [a.judgement.verdict for a in assertions]:
-            self._validity.observe(snapshot, episode.contacts.pairs)
-        episode.naturalness.observe(snapshot)
-        episode.criticality.observe(snapshot, contacts)
+        if self.measured:
+            if VIOLATED not in [a.judgement.verdict for a in assertions]:
+                self._validity.observe(snapshot, episode.contacts.pairs)
+            episode.naturalness.observe(snapshot)
+            episode.criticality.observe(snapshot, contacts)
         for assertion in assertions:
             assertion.observe(snapshot, contacts)
         self.history.append(snapshot)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import importlib
 import importlib.util
+import json
 import re
 import sys
 from collections.abc import Callable, Iterator
@@ -73,6 +74,15 @@ def test_every_benchmark_is_played_here() -> None:
     assert scripts == set(re.findall(r'play\(\s*"(\w+)"', here))
 
 
+def test_early_end(play: Play) -> None:
+    """The same is learned of every point, in less time."""
+    found = play("early_end", "--net", NET, "--ego", "constant", "--runs", "30").splitlines()[1]
+    runs, cut, differ, whole, shorter = numbers(found)[:5]
+    assert (runs, differ) == (30, 0)
+    assert cut > 0
+    assert shorter < whole
+
+
 def test_reference_tracks(play: Play) -> None:
     """One cell: the largest differences are within the tolerances."""
     test, everything = play("reference_tracks", "--only", "CPFA/60/50").splitlines()[1:]
@@ -94,6 +104,20 @@ def test_searched_vehicles(play: Play) -> None:
     said = play("searched_vehicles", "--kind", "bicycle", "--ego", "constant", "--runs", "2")
     cells = [[cell.strip() for cell in line.split("|")[1:5]] for line in said.splitlines()[2:]]
     assert cells == [["crossing", "bicycle", "constant", agent] for agent in ("search", "timing")]
+
+
+def test_ast_crosswalk(play: Play) -> None:
+    """A few episodes of each starting point, and one draw of each in SUMO."""
+    lines = play("ast_crosswalk", "--episodes", "50", "--sumo", "1").splitlines()[1:]
+    assert [line.split()[0] for line in lines] == ["start-1", "start-2", "start-3"]
+    assert all("of 50" in line and line.endswith("alike 1") for line in lines)
+
+
+def test_street_suites(play: Play) -> None:
+    """One draw of each tester and number of pedestrians in one suite."""
+    lines = play("street_suites", "--suite", "chance-2019", "--draws", "1", "-j", "1").splitlines()
+    assert len(lines) == 17
+    assert lines[-1].split()[:3] == ["chance-2019", "election", "10"]
 
 
 def test_avoidable(play: Play) -> None:
@@ -125,8 +149,8 @@ def test_branching(play: Play, capsys: pytest.CaptureFixture[str]) -> None:
     assert said.count("5 of 5 branches the same (0 errors), 1 of 1 episodes") == 2
     assert "refused  pedestrians" in said
     assert "by fork" in said
-    before, after = said.split("resources")[1].splitlines()[0].split(": ")[1].split("; ")
-    assert before.rpartition(",")[0] == after.rpartition(",")[0]
+    before, after, _ = said.split("before 2 branches: ")[1].splitlines()[0].split("; ")
+    assert before.rpartition(",")[0] == after.removeprefix("after: ").rpartition(",")[0]
     assert "verdicts the same" in said
 
 
@@ -409,15 +433,22 @@ def test_the_tables_of_the_experiments(
 
 
 def test_scores_against_faulty_drivers(
-    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], tmp_path: Path
 ) -> None:
-    """One driver, ten episodes of a search and of timing."""
+    """One driver, ten episodes of a search and of timing; the table once more from the file."""
     monkeypatch.syspath_prepend(str(ROOT / "experiments" / "search"))
     monkeypatch.setenv("PYTHONPATH", "")
-    words = ["score.py", "--driver", "LetsGo", "--seeds", "1", "--episodes", "10", "-j", "1"]
-    monkeypatch.setattr(sys, "argv", [*words, "--net", "pedestrians"])
+    file = str(tmp_path / "trials.jsonl")
+    words = ["--driver", "SeesTheNearestOnly", "--seed", "1", "--episodes", "10", "-j", "1"]
+    monkeypatch.setattr(sys, "argv", ["score.py", *words, "--net", "pedestrians", "-o", file])
     script("search/score").main()
-    first, *_, last = capsys.readouterr().out.splitlines()
+    table = capsys.readouterr().out
+    first, *_, last = table.splitlines()
     assert first.split() == ["driver", "portfolio", "timing"]
-    assert last.startswith("timing: ")
-    assert "of 1 trials failed a faulty driver" in last
+    assert last.startswith("timing: a faulty driver failed in ")
+    assert " of 1 trials" in last
+    trials = [json.loads(line) for line in Path(file).read_text(encoding="utf-8").splitlines()]
+    assert [(t["driver"], t["testers"]) for t in trials] == [("SeesTheNearestOnly", 2)] * 2
+    monkeypatch.setattr(sys, "argv", ["score.py", "--read", file])
+    script("search/score").main()
+    assert capsys.readouterr().out == table

@@ -17,6 +17,7 @@ from cavsumo.errors import Exit, NetworkError
 from cavsumo.model.bodies import PEDESTRIAN
 from cavsumo.model.scenario import BatchPlan
 from cavsumo.network.site import Site
+from cavsumo.results.traces import read_trace
 from cavsumo.searchers.space import space_of
 
 Capture = pytest.CaptureFixture[str]
@@ -34,6 +35,20 @@ def _folder(folder: Path) -> Path:
     return folder / "found.csv"
 
 
+def _point(file: Path, row: dict[str, str]) -> Any:
+    """What the trace of an episode says that its agents played."""
+    return read_trace(file.parent / row["trace"]).head["memory"]
+
+
+def _halves(whole: Path, half: Path, *more: str) -> None:
+    """The same search, killed in the middle of a generation and continued, two at a time."""
+    _search(half, *more)
+    kept = half.read_bytes().splitlines(keepends=True)[: 1 + 13]
+    half.write_bytes(b"".join(kept))
+    assert _search(half, "--resume", "-j", "2", *more) in (Exit.OK, Exit.VIOLATED)
+    assert rows(half) == rows(whole)
+
+
 @pytest.fixture(scope="module")
 def found(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A search whose ego never brakes."""
@@ -48,11 +63,19 @@ def test_rows_do_not_depend_on_how_it_is_played(found: Path, tmp_path: Path) -> 
     assert _search(both, "-j", "2") == Exit.VIOLATED
     assert rows(both) == rows(found)
     assert traces(both) == traces(found)
-    _search(parts)
-    kept = parts.read_bytes().splitlines(keepends=True)[: 1 + 13]
-    parts.write_bytes(b"".join(kept))
-    assert _search(parts, "--resume", "-j", "2") == Exit.VIOLATED
-    assert rows(parts) == rows(found)
+    _halves(found, parts)
+
+
+@pytest.mark.parametrize("method", ["tree", "explore", "diversity"])
+def test_every_searcher_is_continued_from_its_rows(method: str, tmp_path: Path) -> None:
+    """Its state is what it was told, in the order of the episodes; a row says how it is played."""
+    whole, half = (_folder(tmp_path / name) for name in ("whole", "half"))
+    _search(whole, "--method", method)
+    _halves(whole, half, "--method", method)
+    played = rows(whole)
+    decided = [row["situations"] for row in played if row["situations"]]
+    assert bool(decided) is (method != "diversity")
+    assert main(["replay", str(whole), "21"]) == 0
 
 
 def test_a_search_finds_preventable_failures(found: Path) -> None:
@@ -110,10 +133,60 @@ def test_the_summary_names_common_features(tmp_path: Path, capsys: Capture) -> N
     assert "of the 10 points drawn at random none failed, so at most 30.8% of the space" in said
 
 
+def test_an_episode_ends_when_nobody_can_meet_the_ego(tmp_path: Path, capsys: Capture) -> None:
+    """Outcomes and grades are those of the whole episodes; that the ego arrived is not known."""
+    files = tmp_path / "cut.csv", tmp_path / "whole.csv"
+    for file, words in zip(files, ([], ["--param", "cut=false"]), strict=True):
+        _search(file, "--method", "random", "--trace", "all", *words)
+    cut, whole = map(rows, files)
+    learned = "outcome", "verdicts", "avoidable", "impact_speed_mps", "trigger_time_s", "grade"
+    assert [[r[c] for c in learned] for r in cut] == [[r[c] for c in learned] for r in whole]
+    shorter = [i for i, r in enumerate(cut) if float(r["time_s"]) < float(whole[i]["time_s"])]
+    assert shorter
+    for i in shorter:
+        assert (cut[i]["arrived"], cut[i]["lost_s"], whole[i]["arrived"]) == ("", "", "1")
+    for words in ([], ["--playback"]):
+        capsys.readouterr()
+        assert main(["replay", str(files[0]), str(shorter[0]), *words]) == 0
+        assert "the same" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize("method", ["portfolio", "cma", "explore"])
+def test_a_search_begins_with_what_an_earlier_one_found(
+    method: str, found: Path, tmp_path: Path
+) -> None:
+    """Its best points are played first; decisions are no points of a search by programmes."""
+    earlier = ["--param", f"search.earlier={found}", "--method", method]
+    whole, half = (_folder(tmp_path / name) for name in ("whole", "half"))
+    assert _search(whole, *earlier) == Exit.VIOLATED
+    _halves(whole, half, *earlier)
+    first, best = rows(whole)[0], max(rows(found), key=lambda row: float(row["grade"]))
+    assert bool(first["situations"]) is (method == "explore")
+    assert method == "explore" or _point(whole, first) == _point(found, best)
+
+
+@pytest.mark.parametrize(
+    ("more", "said"),
+    [
+        (["--testers", "2"], "is of another space: testers was 1, is 2"),
+        (["--net", "crossing"], "is of another network, pedestrians, not crossing"),
+    ],
+)
+def test_an_earlier_search_of_another_space_is_refused(
+    more: list[str], said: str, found: Path, tmp_path: Path, capsys: Capture
+) -> None:
+    """One sentence, and nothing is written."""
+    file = tmp_path / "no.csv"
+    assert _search(file, "--param", f"search.earlier={found}", *more) == Exit.USAGE
+    assert said in capsys.readouterr().err
+    assert not list(tmp_path.iterdir())
+
+
 @pytest.mark.parametrize(
     ("words", "said"),
     [
-        (["--method", "cmaes"], "argument --method: invalid choice: 'cmaes'"),
+        (["--method", "explor"], "unknown method 'explor'; did you mean 'explore'?"),
+        (["--param", "search.method=tre"], "unknown method 'tre'; did you mean 'tree'?"),
         (["--shard", "1/2"], "shard 1/2: search"),
     ],
 )

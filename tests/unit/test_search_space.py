@@ -1,4 +1,4 @@
-"""The search for tests without SUMO: the space, the searchers, and the grade of an episode."""
+"""The search for tests without SUMO: the space and the searchers."""
 
 from __future__ import annotations
 
@@ -6,21 +6,18 @@ import dataclasses
 import json
 import math
 from collections.abc import Callable
-from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 import pytest
 
 from cavsumo.agents.searched import programme_of
-from cavsumo.assertions.judgement import HELD, NOT_TRIGGERED, UNFAIR, VIOLATED, Judgement
 from cavsumo.errors import NetworkError
 from cavsumo.model.bodies import CAR, PEDESTRIAN
 from cavsumo.model.carriageway import Limit, Start
 from cavsumo.model.geometry import Box, gap
 from cavsumo.model.scenario import BatchPlan
 from cavsumo.network.site import Site
-from cavsumo.results.grade import INVALID_GRADE, grade
 from cavsumo.searchers.drives import Drives, drive_of
 from cavsumo.searchers.manoeuvres import MANOEUVRES, PAIRS, ManoeuvreSearch
 from cavsumo.searchers.methods import SEARCHERS, searcher_of
@@ -29,7 +26,6 @@ from cavsumo.searchers.protocol import GENERATION, PlayedPoint
 from cavsumo.searchers.space import FURTHER, TOGETHER, Point, Space, space_of
 from cavsumo.searchers.walks import Walks, walk_of
 from cavsumo.searchers.words import Failure, in_common
-from cavsumo.simulation.avoidability import Avoidability
 
 SIDES = (False, True)  # from the right, from the left
 
@@ -278,35 +274,3 @@ def test_features_of_vehicles(drives: Space, numbers: dict[str, float], words: s
     drive = drive_of(dict.fromkeys(Drives.meanings, 0.5) | numbers, CAR)
     said = in_common([Failure(place, drive, 1)], "car")
     assert said == f"car from the right, 5.0 m/s, {words}, with another one"
-
-
-def _episode(judgement: Judgement, outcome: str = "", min_gap: float = 1.0) -> Any:
-    """An episode that nobody saw, so that nobody was near."""
-    contacts = SimpleNamespace(min_gap=min_gap)
-    return SimpleNamespace(
-        judgement=judgement, outcome=outcome or judgement.verdict, contacts=contacts, seen=[]
-    )
-
-
-def test_grades_order_episodes() -> None:
-    """From invalid over nobody met, unfair, held and unpreventable to a hard impact."""
-    hit = Judgement("collision", VIOLATED, "tester0", impact_speed=3.0, robustness=-3.0)
-    late = Judgement("reaction-zone", UNFAIR, "tester0", ego_speed=8.0)
-    cases = [
-        (_episode(hit, "invalid"), None),
-        (_episode(Judgement("", NOT_TRIGGERED)), None),
-        (_episode(late, min_gap=1.0), None),
-        (_episode(late, min_gap=3.0), None),
-        (_episode(Judgement("reaction-zone", HELD, "tester0")), None),
-        (_episode(hit), Avoidability(False, perceived=5.0)),
-        (_episode(hit), Avoidability(False, last_chance=4.0, perceived=5.0)),
-        (_episode(hit), Avoidability(False, last_chance=4.8, perceived=5.0)),
-        (_episode(hit), Avoidability(True, last_chance=5.0, perceived=4.0)),
-        (_episode(dataclasses.replace(hit, impact_speed=8.0)), Avoidability(True)),
-    ]
-    grades = [grade(*case) for case in cases]
-    assert grades == sorted(grades)
-    assert len(set(grades)) == len(grades)
-    assert grades[0] == INVALID_GRADE
-    assert grades[-2:] == [3.0, 8.0]
-    assert sum(g >= 0.0 for g in grades) == 2

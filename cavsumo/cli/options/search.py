@@ -32,7 +32,7 @@ def add_search(commands: Any) -> None:
 def _fill(search: argparse.ArgumentParser) -> None:
     """Add the options."""
     search.add_argument(
-        "--method", choices=SEARCH_METHODS, metavar="NAME",
+        "--method", metavar="NAME",
         help=f"how points are chosen: {', '.join(SEARCH_METHODS)} (default {SEARCH_METHODS[0]})",
     )  # fmt: skip
     fill(search)
