@@ -99,6 +99,13 @@ def test_un_r157(play: Play) -> None:
     assert line.split() == ["deceleration", "1,121", "0", "0"]
 
 
+def test_searched_vehicles(play: Play) -> None:
+    """A line for each agent."""
+    said = play("searched_vehicles", "--kind", "bicycle", "--ego", "constant", "--runs", "2")
+    cells = [[cell.strip() for cell in line.split("|")[1:5]] for line in said.splitlines()[2:]]
+    assert cells == [["crossing", "bicycle", "constant", agent] for agent in ("search", "timing")]
+
+
 def test_ast_crosswalk(play: Play) -> None:
     """A few episodes of each starting point, and one draw of each in SUMO."""
     lines = play("ast_crosswalk", "--episodes", "50", "--sumo", "1").splitlines()[1:]
