@@ -20,6 +20,7 @@ from cavsumo.batch.jobs import Memory
 from cavsumo.batch.prepared import PreparedBatch
 from cavsumo.errors import ResultsError
 from cavsumo.model.bodies import kind_named
+from cavsumo.results.alike import FEATURES, kind_of
 from cavsumo.results.grade import INVALID_GRADE
 from cavsumo.results.rows import cell
 from cavsumo.searchers.methods import searcher_of
@@ -27,7 +28,7 @@ from cavsumo.searchers.protocol import PlayedPoint
 from cavsumo.searchers.space import Point, Space, space_of
 from cavsumo.searchers.words import in_common
 
-SPEED_BIN_MPS, PLACE_BIN_M = 2.0, 10.0  # failures within a bin are alike
+TOLD = ("grade", "outcome", "avoidable", *FEATURES)  # columns
 
 
 @dataclass(frozen=True)
@@ -94,7 +95,7 @@ class Searching:
         run = int(row["run"])
         if self.ready(run):
             number = self._number(run)
-            self._told[number] = self._result(self.points[number], row)
+            self._told[number] = self._result(row)
             self._lasted[number] = float(cell(row["time_s"]) or 0.0)
 
     def facts(self) -> SearchFacts:
@@ -131,20 +132,12 @@ class Searching:
         if self._searcher.uniform:
             self._uniform.update(self._generation)
 
-    def _result(self, point: Point, row: Mapping[str, Any]) -> PlayedPoint:
+    def _result(self, row: Mapping[str, Any]) -> PlayedPoint:
         """The result of a point; a row of this session and one that was recorded tell the same."""
-        text = {key: cell(row[key]) for key in ("grade", "outcome", "avoidable", "tester")}
+        text = {key: cell(row[key]) for key in TOLD}
         grade = float(text["grade"]) if text["grade"] else INVALID_GRADE
         failed = text["outcome"] == "violated" and text["avoidable"] != "0" and grade >= 0.0
-        return PlayedPoint(
-            grade, failed, self._kind(point, text["tester"], grade) if failed else ()
-        )
-
-    def _kind(self, point: Point, tester: str, impact: float) -> tuple[object, ...]:
-        """Impact speed, side and place of a failure, by which failures are alike."""
-        number = int(tester.removeprefix("tester")) if tester.startswith("tester") else 0
-        place = self.space.place(point, number)
-        return impact // SPEED_BIN_MPS, place.left, place.along // PLACE_BIN_M
+        return PlayedPoint(grade, failed, kind_of(text) if failed else ())
 
 
 def space_of_batch(prepared: PreparedBatch) -> Space:

@@ -27,6 +27,7 @@ from cavsumo.simulation.moving import moved
 from cavsumo.simulation.rewards import Feedback, RewardMonitor
 from cavsumo.simulation.setup import Setup
 from cavsumo.simulation.starting import cast, generators_of, started
+from cavsumo.simulation.tester_course import tester_course
 
 
 class EpisodeLoop:
@@ -183,6 +184,7 @@ class EpisodeLoop:
         arrived = True if self._arrived else False if late else None
         episode.progress = ego_progress(self.scene, self.history, arrived, cut=self._cut)
         episode.invalid, episode.breach = spoilt is not None, spoilt or self._validity.first
+        episode.course = tester_course(self.scene, self.history, episode.judgement.tester)
         if episode.outcome == VIOLATED:
             episode.blame = blamed(self.scene, self.history, episode.judgement)
         elif episode.outcome in (HELD, UNFAIR):
