@@ -26,7 +26,8 @@ AGENT_NAMES = Names(
         "timing": "programmed",
     },
     {
-        "best-response": "aim model learn explore replan missed unfair confidence run_up_m",
+        "best-response": "aim model learn explore replan missed unfair unpreventable confidence "
+        "run_up_m",
         "election": "distance_m rule idle manoeuvre",
         "expectiminimax": "against price_per_s grid_s top accel",
         "programmed-random": "rate_per_s epsilon idle manoeuvre",

@@ -27,6 +27,7 @@ from cavsumo.simulation.moving import moved
 from cavsumo.simulation.rewards import Feedback, RewardMonitor
 from cavsumo.simulation.setup import Setup
 from cavsumo.simulation.starting import cast, generators_of, started
+from cavsumo.simulation.tester_course import tester_course
 
 
 class EpisodeLoop:
@@ -185,6 +186,7 @@ class EpisodeLoop:
         arrived = True if self._arrived else False if late else None
         episode.progress = ego_progress(self.scene, self.history, arrived, cut=self._cut)
         episode.invalid, episode.breach = spoilt is not None, spoilt or self._validity.first
+        episode.course = tester_course(self.scene, self.history, episode.judgement.tester)
         if episode.outcome == VIOLATED:
             episode.blame = blamed(self.scene, self.history, episode.judgement)
         elif self.measured and episode.outcome in (HELD, UNFAIR):

@@ -129,6 +129,16 @@ def test_avoidable(play: Play) -> None:
     ]
 
 
+def test_aims(play: Play) -> None:
+    """Two episodes of each aim, of which the first explores."""
+    words = "--runs", "2", "--explore", "1", "--net", NET
+    found = play("aims", *words).splitlines()[1:]
+    assert [line.split()[:3] for line in found] == [
+        ["pedestrians", "preventable", "1"],
+        ["pedestrians", "violation", "1"],
+    ]
+
+
 def test_best_response(play: Play) -> None:
     """One episode each of learning, of timing and of what was learned."""
     said = play(
