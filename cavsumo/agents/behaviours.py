@@ -8,7 +8,7 @@ from __future__ import annotations
 from typing import Protocol
 
 from cavsumo.agents.avoidance import Avoidance
-from cavsumo.agents.manoeuvres import Driver
+from cavsumo.agents.manoeuvres import Driver, manoeuvre_on
 from cavsumo.agents.triggers import Timing, Trigger
 from cavsumo.agents.walking import ApproachKerb, CrossingWalk, Stroll
 from cavsumo.model.bodies import NOOP, Action
@@ -44,9 +44,10 @@ class Behaviour(Protocol):
 
 def behaviour(scene: Scene, index: int, idle: str, manoeuvre: str) -> Behaviour:
     """The behaviour of a body, by its start."""
-    if scene.starts[index].approach is None:
+    approach = scene.starts[index].approach
+    if approach is None:
         return Walker(scene, index, idle)
-    return Driver(scene, index, idle, manoeuvre)
+    return Driver(scene, index, idle, manoeuvre_on(manoeuvre, approach.type))
 
 
 class Idle(Protocol):

@@ -148,6 +148,18 @@ def steer_at(state: BodyState, x: float, y: float) -> float:
     return min(kind.steering_max, max(-kind.steering_max, wanted))
 
 
+def within_turn(action: Action, state: BodyState, lateral: float) -> Action:
+    """An action whose turn accelerates a body sideways by no more than that [m/s2].
+
+    On its circle the acceleration is v^2 sin(beta) / (b / 2), and tan(e) = 2 tan(beta).
+    """
+    sine = lateral * state.body.kind.wheelbase / (2.0 * max(state.v, 1e-9) ** 2)
+    if sine >= 1.0:
+        return action
+    most = math.atan(2.0 * math.tan(math.asin(sine)))
+    return action._replace(steering=max(-most, min(most, action.steering)))
+
+
 def stopping_from(distance: float, onward: float, dt: float) -> float:
     """The largest speed from which a body still stops in time [m/s].
 

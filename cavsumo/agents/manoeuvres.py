@@ -8,7 +8,7 @@ On the ego's lane and beside it, it keeps the speed with which it started.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from typing import ClassVar
 
 from cavsumo.agents.driving import HASTE_MPS2, RUN_OUT_M, Course, stopping_from
@@ -97,13 +97,14 @@ class Run(Manoeuvre):
     """Drives on across or into the ego's way, against lights, signs and other traffic."""
 
     types = ("crossing", "merging")
+    gaining = HASTE_MPS2  # throttle
 
     def possible(self, state: BodyState) -> bool:
         return self.course.place(state)[0] < self.approach.enter
 
     def act(self, state: BodyState, others: Iterator[BodyState]) -> Action:
         allowed = self.course.room(state, others)
-        return self.course.drive(state, allowed, gaining=HASTE_MPS2)
+        return self.course.drive(state, allowed, gaining=self.gaining)
 
     def over(self, state: BodyState) -> bool:
         end = min(self.approach.leave, self.approach.enter + FAR_M)
@@ -113,7 +114,7 @@ class Run(Manoeuvre):
         if not self.possible(state):
             return None
         approach, path = self.approach, self.scene.ego_path
-        time, v = self.course.time_to(state, approach.enter)
+        time, v = self.course.time_to(state, approach.enter, self.gaining)
         turn = self.course.path.at(approach.enter)[2] - path.at(approach.ego_enter)[2]
         front, ego_v = ego.after(time + self.scene.dt)
         return approach.ego_enter - front + drift(v * math.cos(turn), ego_v, MAX_DECEL), ego_v
@@ -146,17 +147,20 @@ class CutIn(Manoeuvre):
 
     def begin(self, state: BodyState) -> None:
         assert self.approach.into is not None
-        kind, top = state.body.kind, max(state.v, CREEPING_MPS)
-        self.course = Course(self.approach.into, kind, self.scene.dt, top)
-        self.slowed = SLOWED * top
-        self.arrived = False
+        top = max(state.v, CREEPING_MPS)
+        self.course = Course(self.approach.into, state.body.kind, self.scene.dt, top)
+        self.slowed, self.arrived = SLOWED * top, False
 
     def act(self, state: BodyState, others: Iterator[BodyState]) -> Action:
         self.arrived = self.arrived or abs(self.course.place(state)[1]) < ARRIVED_M
         allowed = self.course.room(state, others)
         if self.arrived:
             return self.course.drive(state, min(allowed, self.slowed))
-        return self.course.drive(state, allowed, look=CUT_IN_LOOK_M)
+        return self.course.drive(state, allowed, look=self.look(state))
+
+    def look(self, state: BodyState) -> float:
+        """The distance of the point pursued while it changes lanes [m]."""
+        return CUT_IN_LOOK_M
 
     def over(self, state: BodyState) -> bool:
         end = self.course.path.length - STOPPING_M
@@ -169,12 +173,13 @@ class CutIn(Manoeuvre):
             return None
         # Pursuing a point at the distance L on a line, a body closes in on it as exp(-way / L).
         strips = (kind.width + self.scene.ego.kind.width) / 2
-        time = CUT_IN_LOOK_M * math.log(max(1.0, abs(here.lateral) / strips)) / state.v
+        time = self.look(state) * math.log(max(1.0, abs(here.lateral) / strips)) / state.v
         rear = here.along - kind.length / 2 + state.v * time
         front, ego_v = ego.after(time)
         return rear + drift(state.v, ego_v, MAX_DECEL) - front, ego_v
 
 
+MakeManoeuvre = Callable[[Scene, Approach, Course], Manoeuvre]
 KNOWN: Mapping[str, type[Manoeuvre]] = {"run": Run, "brake": Brake, "cut-in": CutIn}
 
 
@@ -196,11 +201,10 @@ class Driver:
 
     Args:
         idle: "noop" does nothing until it is triggered; any other word drives lawfully.
-        name: one of MANOEUVRES. A vehicle on an approach on which that is impossible drives
-            lawfully throughout.
+        chosen: makes its manoeuvre on its course; None: it drives lawfully throughout.
     """
 
-    def __init__(self, scene: Scene, index: int, idle: str, name: str) -> None:
+    def __init__(self, scene: Scene, index: int, idle: str, chosen: MakeManoeuvre | None) -> None:
         approach = scene.starts[index].approach
         assert approach is not None
         self.scene, self.approach, self._noop = scene, approach, idle == "noop"
@@ -208,7 +212,6 @@ class Driver:
         waits = math.isfinite(approach.wait)
         top = approach.speed if waits else scene.starts[index].v or approach.speed
         self.course = Course(approach.path, kind, scene.dt, top)
-        chosen = manoeuvre_on(name, approach.type)
         self.manoeuvre = chosen(scene, approach, self.course) if chosen else None
         self.active = self._begun = False
         # Beyond the end of a road SUMO's drivers do not see a body. There it is out of the way of
@@ -219,8 +222,8 @@ class Driver:
         if beside and approach.path.length - approach.leave < SQUEEZE_M:
             self._run_out += approach.leave - approach.path.length
 
-    def idle(self, snapshot: Snapshot, state: BodyState) -> Action:
-        """Drive lawfully, or do nothing before it begins."""
+    def idle(self, snapshot: Snapshot, state: BodyState, *, hurry: bool = False) -> Action:
+        """Drive lawfully, perhaps in a hurry up to where it waits; or do nothing yet."""
         if self._noop and not self._begun:
             return NOOP
         here, dt = self.course.place(state)[0], self.scene.dt
@@ -228,7 +231,7 @@ class Driver:
         allowed = self.course.room(state, everybody(snapshot, state))
         if not self._begun and here < self.approach.enter:
             left = min(left, self.approach.wait - here - state.v * dt)
-            allowed = min(allowed, self._unhurried(snapshot, here))
+            allowed = min(allowed, math.inf if hurry else self._unhurried(snapshot, here))
         return self.course.drive(state, min(allowed, stopping_from(left, 0.0, dt)))
 
     def _unhurried(self, snapshot: Snapshot, here: float) -> float:

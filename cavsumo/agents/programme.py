@@ -1,6 +1,6 @@
-"""A pedestrian's programme: legs across the road, begun as the ego comes to a certain place.
+"""A pedestrian's programme: legs across the road, begun by a cue of the ego.
 
-A programme is a few numbers, so that a search can vary it (``searchers.space``): when the body
+A programme is a few numbers, so that a search can vary it (``searchers.walks``): when the body
 steps off, two legs with a pause between them, and the direction in which it leaves. Places and
 directions are relative to the ego's path, so a programme makes sense on any road.
 """
@@ -11,9 +11,9 @@ import math
 from typing import NamedTuple
 
 from cavsumo.agents.avoidance import Avoidance
+from cavsumo.agents.cues import Awaited, Cue, EgoReactions, in_phase, zone_m
 from cavsumo.agents.legs import WalkLeg, walk_time
 from cavsumo.agents.planning.coordinates import meeting
-from cavsumo.agents.triggers import MAX_DECEL, REACTION_TIME
 from cavsumo.agents.walking import ApproachKerb, stopping_speed, walk
 from cavsumo.model.bodies import Action, Kind
 from cavsumo.model.kinematics import wrap
@@ -22,6 +22,7 @@ from cavsumo.model.snapshot import BodyState, Snapshot
 
 LONGEST_WAIT_S = 8.0  # a body that waits for the ego on the road goes on after this time
 STOPPED_M = 0.05  # so near to the end of its leg a body has arrived
+ROUND_M = 2.0  # that a body's course is longer for turning and stopping
 BEYOND_M = 0.6  # so far beyond the edge of the carriageway a body stops
 
 
@@ -32,28 +33,33 @@ class WalkProgramme(NamedTuple):
     goes, negative ones towards where it comes from.
 
     Attributes:
-        zone: it steps off when an ego that keeps its speed will have this gap left to it as it
-            enters the ego's strip: 0 is the ego's braking distance, 1 that and the way of its
-            reaction time (``triggers``).
+        cue: it steps off when an ego that keeps its speed will be in this zone as it enters the
+            ego's strip, or after this reaction of the ego (``cues``).
         speed, heading: of the first leg [m/s, rad].
         depth: where the first leg ends: how far the body's front is in the ego's strip, negative
             before it [m].
-        pause: how long it then stands [s].
-        resume: it stands on until the gap to the ego is in this zone; None: after the pause.
+        pause: how long it then stands at least [s].
+        resume: it stands on until this cue; None: no longer.
         speed_2, heading_2, length_2: of the second leg [m/s, rad, m].
         heading_3: of the last one, with the speed of the second, until it has left the road [rad].
+        delay: time from a reaction of the ego to the first leg [s].
+        every, phase: it steps off at a time that is ``phase`` modulo ``every``, the time between
+            two decisions of the ego: at the one nearest to its zone [s]. 0 and 0: at any time.
     """
 
-    zone: float
+    cue: Cue
     speed: float
     heading: float
     depth: float
     pause: float
-    resume: float | None
+    resume: Cue | None
     speed_2: float
     heading_2: float
     length_2: float
     heading_3: float
+    delay: float = 0.0
+    every: float = 0.0
+    phase: float = 0.0
 
     @property
     def stops(self) -> bool:
@@ -72,6 +78,8 @@ class ProgrammedWalk:
         self._phase = 0  # before, first leg, pause, second leg, last leg, gone
         self._since = 0.0  # when the pause began [s]
         self._from = (0.0, 0.0)  # where the second leg began
+        self._reactions = EgoReactions()
+        self._awaited = _awaited(programme.cue, programme.delay) if programme else None
         if self._met is not None:
             _, _, ahead = scene.ego_path.at(self._met.along)
             self._side = math.copysign(1.0, math.sin(ahead - self._met.way.heading))
@@ -81,6 +89,7 @@ class ProgrammedWalk:
         programme, dt = self.programme, self.scene.dt
         if programme is None or self._met is None:
             return self._avoidance.along(snapshot, state, self._idle.action(state))
+        self._reactions.see(snapshot)
         self._advance(snapshot, state, programme)
         if self._phase == 0:
             return self._avoidance.along(snapshot, state, self._idle.action(state))
@@ -89,6 +98,21 @@ class ProgrammedWalk:
             speed = min(speed, stopping_speed(state.body.kind, self._to_go(state, programme), dt))
         wanted = walk(state, heading, speed, dt)
         return self._avoidance.across(snapshot, state, wanted, heading)
+
+    def reach(self, snapshot: Snapshot, state: BodyState) -> float:
+        """How far the body may come from where it is, detours around others apart [m]."""
+        if self.programme is None or self._met is None:
+            return ROUND_M + self._idle.left(state)
+        way, programme = self._met.way, self.programme
+        across = way.leave - way.enter + 2.0 * BEYOND_M
+        legs = (
+            (1, across / math.cos(programme.heading)),
+            (3, programme.length_2),
+            (4, across / max(1e-9, abs(math.cos(programme.heading_3)))),
+        )
+        ahead = sum(length for phase, length in legs if self._phase <= phase)
+        kind, left = state.body.kind, max(0.0, self.scene.horizon - snapshot.time)
+        return ROUND_M + min(ahead, kind.v_max * left)
 
     def _course(self, state: BodyState, programme: WalkProgramme) -> tuple[float, float]:
         """The heading [rad] and the speed [m/s] of the present phase."""
@@ -114,6 +138,7 @@ class ProgrammedWalk:
             self._phase = 1
         if self._phase == 1 and self._to_go(state, programme) <= STOPPED_M * programme.stops:
             self._phase, self._since = 2, snapshot.time
+            self._awaited = _awaited(programme.resume)
         if self._phase == 2 and self._goes_on(snapshot, state, programme):
             self._phase, self._from = 3, (state.x, state.y)
         if self._phase == 3 and math.dist(self._from, (state.x, state.y)) >= programme.length_2:
@@ -139,21 +164,29 @@ class ProgrammedWalk:
         """Whether the body steps off now."""
         if not snapshot.sees_ego:
             return False
+        if isinstance(programme.cue, str):
+            assert self._awaited is not None
+            return self._awaited.came(self._reactions, snapshot.time)
         assert self._met is not None
         met = self._met
         left = max(0.0, met.strip - met.way.progress(state.x, state.y))
         entry, shift = entry_of(programme, left, state.body.kind)
-        return self._gap(snapshot, shift) - snapshot.ego.v * (entry + self.scene.dt) <= zone_m(
-            programme.zone, snapshot.ego.v
+        v = snapshot.ego.v
+        gap = self._gap(snapshot, shift) - v * (entry + self.scene.dt)
+        return gap <= zone_m(programme.cue, v) + v * programme.every / 2 and in_phase(
+            snapshot.time, programme.phase, programme.every, self.scene.dt
         )
 
     def _goes_on(self, snapshot: Snapshot, state: BodyState, programme: WalkProgramme) -> bool:
         """Whether the pause is over."""
         waited = snapshot.time - self._since
+        reacted = self._awaited is None or self._awaited.came(self._reactions, snapshot.time)
         if waited < programme.pause - 1e-9:
             return False
         if programme.resume is None or waited >= LONGEST_WAIT_S:
             return True
+        if isinstance(programme.resume, str):
+            return reacted
         met = self._met
         assert met is not None
         v, along = snapshot.ego.v, self.scene.ego_path.project(state.x, state.y).along
@@ -191,6 +224,6 @@ def _last_legs(programme: WalkProgramme) -> list[WalkLeg]:
     return [second, WalkLeg(programme.speed_2, programme.heading_3, math.inf)]
 
 
-def zone_m(zone: float, v: float) -> float:
-    """A zone as a distance ahead of an ego of a speed [m]."""
-    return 0.5 * v * v / MAX_DECEL + zone * REACTION_TIME * v
+def _awaited(cue: Cue | None, delay: float = 0.0) -> Awaited | None:
+    """The reaction to be awaited for a cue; None for any other cue."""
+    return Awaited(cue, delay) if isinstance(cue, str) else None

@@ -71,19 +71,29 @@ class RecordedAgent(Agent):
     """Begins and acts as it is told (``certify --open-loop``), then does nothing.
 
     It is told that as what it remembers, see ``Recorded.memories``.
+
+    Attributes:
+        ends: whether its bodies rest behind the end of the record (``Agent.rests``).
     """
 
     sees_background = False
 
     def __init__(self) -> None:
         self._actions: list[tuple[Action, ...]] = []
+        self._done, self.ends = 0, False
 
     def reset(self, scene: Scene, owned: Sequence[int], rng: np.random.Generator) -> None:
         super().reset(scene, owned, rng)
-        self._next = iter(self._actions)
+        self._done = 0
 
     def choose_action(self, snapshot: Snapshot) -> tuple[Action, ...]:
-        return next(self._next, (NOOP,) * len(self.owned))
+        if self._done == len(self._actions):
+            return (NOOP,) * len(self.owned)
+        self._done += 1
+        return self._actions[self._done - 1]
+
+    def rests(self) -> bool:
+        return self.ends and self._done == len(self._actions)
 
     def recall(self) -> Any:
         return {

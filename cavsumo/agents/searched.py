@@ -13,15 +13,20 @@ import numpy as np
 
 from cavsumo.agents.base import AGENTS, Agent
 from cavsumo.agents.decisions import DecidedWalk, Decision, Decisions, written
+from cavsumo.agents.drive_programme import ProgrammedDrive
 from cavsumo.agents.names import SEARCH, SEARCH_METHODS
 from cavsumo.agents.programme import ProgrammedWalk, WalkProgramme
+from cavsumo.agents.programmed_manoeuvres import DriveProgramme
 from cavsumo.agents.recorded import start_of
+from cavsumo.agents.walking import throttle_to
 from cavsumo.errors import UnknownName
 from cavsumo.model.bodies import Action
+from cavsumo.model.checks import truth
+from cavsumo.model.left_behind import LeftBehind
 from cavsumo.model.scene import Scene
 from cavsumo.model.snapshot import Snapshot
 
-Programme = WalkProgramme | Decisions
+Programme = WalkProgramme | DriveProgramme
 
 
 @AGENTS.register(SEARCH)
@@ -30,58 +35,93 @@ class SearchAgent(Agent):
 
     PARAMETERS: ClassVar[Mapping[str, str]] = {
         "method": f"how points are chosen: {', '.join(SEARCH_METHODS)} (docs/search.md)",
+        "cut": "end an episode once the ego has left all bodies behind; false to play on",
         "earlier": "results of an earlier search of the same space, whose best points come first",
     }
     FILES = ("earlier",)
     sees_background = False
-    drives = False
     searches = True
 
-    def __init__(self, method: str = "portfolio", earlier: str = "") -> None:
+    def __init__(self, method: str = "portfolio", cut: bool = True, earlier: str = "") -> None:
         if method not in SEARCH_METHODS:
             raise UnknownName("method", method, SEARCH_METHODS, f"agent {SEARCH}")
         self.method, self.earlier = method, earlier
-        self._programmes: list[Programme | None] = []
+        self.cut = truth("cut", cut)
+        self._programmes: list[Programme | Decisions | None] = []
+        self._fellows: Sequence[SearchAgent] = ()
 
     def reset(self, scene: Scene, owned: Sequence[int], rng: np.random.Generator) -> None:
         super().reset(scene, owned, rng)
         programmes = self._programmes or [None] * len(owned)
-        self._walks = [
-            _walk(scene, i, programme) for i, programme in zip(owned, programmes, strict=True)
+        self._programmed = [
+            _programmed(scene, i, programme) for i, programme in zip(owned, programmes, strict=True)
         ]
+        self._behind, self._resting = LeftBehind(scene), False
 
     def choose_action(self, snapshot: Snapshot) -> tuple[Action, ...]:
+        states, dt = self.own(snapshot), self.scene.dt
+        self._resting = self._resting or (self.cut and self._left_behind(snapshot))
+        if self._resting:
+            return tuple(Action(throttle_to(state, 0.0, dt), 0.0) for state in states)
         return tuple(
-            walk.action(snapshot, state)
-            for walk, state in zip(self._walks, self.own(snapshot), strict=True)
+            one.action(snapshot, state) for one, state in zip(self._programmed, states, strict=True)
         )
+
+    def rests(self) -> bool:
+        return self._resting
+
+    def _left_behind(self, snapshot: Snapshot) -> bool:
+        """Whether the ego has left behind all that any tester's programme still comes to."""
+        programmed = [one for agent in self._fellows or (self,) for one in agent._programmed]
+        return snapshot.sees_ego and all(
+            self._behind(snapshot, state, one.reach(snapshot, state))
+            for one in programmed
+            if (state := snapshot.testers[one.index])
+        )
+
+    @classmethod
+    def coordinate(cls, agents: Sequence[Agent], rng: np.random.Generator) -> None:
+        fellows = [agent for agent in agents if isinstance(agent, SearchAgent)]
+        for agent in fellows:
+            agent._fellows = fellows
 
     def recall(self) -> Any:
         return {
             "starts": self.recorded_starts,
-            "programmes": [one and list(one) for one in self._programmes],
+            "programmes": [one and one._asdict() for one in self._programmes],
         }
 
     def notes(self) -> str:
         """The situations in which its first body decided; empty where it follows a programme."""
-        first = self._walks[0]
+        first = self._programmed[0]
         return written(first.situations) if isinstance(first, DecidedWalk) else ""
 
     def remember(self, memory: Mapping[str, Any]) -> None:
         self.recorded_starts = [start_of(start) for start in memory["starts"]]
-        self._programmes = [one and _programme(one) for one in memory["programmes"]]
+        self._programmes = [one and _told(one) for one in memory["programmes"]]
 
 
-def _programme(plain: Sequence[Any]) -> Programme:
-    """A programme from a list of its fields; that of decisions has but two."""
-    if len(plain) == len(Decisions._fields):
-        arrival, chosen = plain
-        return Decisions(arrival, [Decision(*one) for one in chosen])
-    return WalkProgramme(*plain)
-
-
-def _walk(scene: Scene, index: int, programme: Programme | None) -> ProgrammedWalk | DecidedWalk:
-    """The walk of one body."""
+def _programmed(
+    scene: Scene, index: int, programme: Programme | Decisions | None
+) -> ProgrammedWalk | DecidedWalk | ProgrammedDrive:
+    """A body that follows a programme or its decisions; None: it stands by."""
     if isinstance(programme, Decisions):
         return DecidedWalk(scene, index, programme)
-    return ProgrammedWalk(scene, index, programme)
+    if scene.starts[index].approach is None:
+        assert not isinstance(programme, DriveProgramme)
+        return ProgrammedWalk(scene, index, programme)
+    assert not isinstance(programme, WalkProgramme)
+    return ProgrammedDrive(scene, index, programme)
+
+
+def _told(plain: Mapping[str, Any]) -> Programme | Decisions:
+    """A programme or decisions from their fields; raises TypeError for others."""
+    if "chosen" in plain:
+        return Decisions(plain["arrival"], [Decision(*one) for one in plain["chosen"]])
+    return programme_of(plain)
+
+
+def programme_of(plain: Mapping[str, Any]) -> Programme:
+    """A programme from its fields; raises TypeError for others."""
+    made = DriveProgramme if "effort" in plain else WalkProgramme
+    return made(**plain)

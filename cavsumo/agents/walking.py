@@ -172,6 +172,12 @@ class ApproachKerb:
             self._last = state, self._approach(state)
         return self._last[1]
 
+    def left(self, state: BodyState) -> float:
+        """How far it still goes [m]."""
+        if self.way is None:
+            return 0.0
+        return max(0.0, self.stop - self.way.progress(state.x, state.y))
+
     def _approach(self, state: BodyState) -> Action:
         """Walk up to the kerb; a body too fast to stop there brakes before it turns."""
         kind = state.body.kind

@@ -32,12 +32,15 @@ class Assertion:
             snapshots; contacts are reported in any case. See ``Agent.sees_background``.
         unconditional: it has no precondition, so that every episode is a test of it. Among several
             assertions its verdict ``held`` does not make an episode a test (``weightiest``).
+        about_testers: while it is not pending, only a tester ahead of the ego or beside it can
+            change the judgement; so nothing does once all of them are left behind.
         unit: of the robustness.
     """
 
     PARAMETERS: ClassVar[Mapping[str, str]] = {}
     sees_background: bool = True
     unconditional: bool = False
+    about_testers: bool = False
     unit: ClassVar[str] = ""
     name: ClassVar[str]
 

@@ -53,6 +53,7 @@ class ReactionZoneAssertion(Assertion):
     name: ClassVar[str] = "reaction-zone"
     unit: ClassVar[str] = "m, minus m/s"
     sees_background = False
+    about_testers = True
     PARAMETERS: ClassVar[Mapping[str, str]] = {
         "max_decel": "the deceleration that the zones assume [m/s2]",
         "reaction_time": "the reaction time that the zones assume [s]",

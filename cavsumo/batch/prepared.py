@@ -85,8 +85,16 @@ class PreparedBatch:
     @cached_property
     def space(self) -> Space:
         """The tests from which searchers choose; raises NetworkError where it holds no start."""
-        scenario = self.plan.scenario
-        return space_of(self.site, kind_named(scenario.kind), teams(scenario))
+        scenario, ego = self.plan.scenario, ego_of(self.plan.scenario)
+        every = ego.decides_every_s if ego.decides_every_s > scenario.step_length else 0.0
+        return space_of(
+            self.site,
+            kind_named(scenario.kind),
+            teams(scenario),
+            ego=ego.kind,
+            start_speed=scenario.start_speed,
+            every=every,
+        )
 
     @cached_property
     def packed(self) -> bytes:

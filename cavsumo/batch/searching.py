@@ -24,7 +24,7 @@ from cavsumo.searchers.continued import ContinuedSearch
 from cavsumo.searchers.methods import searcher_of
 from cavsumo.searchers.protocol import PlayedPoint, PointSpace
 from cavsumo.searchers.space import Point
-from cavsumo.searchers.words import in_common
+from cavsumo.searchers.words import Failure, in_common
 
 TOLD = ("grade", "outcome", "avoidable", "tester", "situations")  # columns
 SPEED_BIN_MPS, PLACE_BIN_M = 2.0, 10.0  # failures within a bin are alike
@@ -78,6 +78,7 @@ class Searching:
         self.spaces: list[PointSpace] = []
         self._generation: list[int] = []  # episodes of the points that were asked for last
         self._told: dict[int, PlayedPoint] = {}
+        self._testers: dict[int, int] = {}  # the body that the verdict of an episode names
         self._lasted: dict[int, float] = {}
         self._uniform: set[int] = set()
 
@@ -101,6 +102,7 @@ class Searching:
         if self.ready(run):
             number = self._number(run)
             self._told[number] = self._result(number, row)
+            self._testers[number] = _body(cell(row["tester"]))
             self._lasted[number] = float(cell(row["time_s"]) or 0.0)
 
     def best(self) -> list[tuple[PointSpace, Point]]:
@@ -124,7 +126,7 @@ class Searching:
             failures=len(failed),
             distinct=len({self._told[n].kind for n in failed}),
             first=first,
-            words=in_common([self.spaces[n].seen(self.points[n])[0] for n in failed]),
+            words=in_common([self._failure(n) for n in failed], self.space.movements.kind.name),
             uniform=sum(n in self._uniform for n in numbers),
             covered=self.space.covered(played),
         )
@@ -150,11 +152,22 @@ class Searching:
         text = {key: cell(row[key]) for key in TOLD}
         grade = float(text["grade"]) if text["grade"] else INVALID_GRADE
         failed = text["outcome"] == "violated" and text["avoidable"] != "0" and grade >= 0.0
-        kind = self._kind(number, text["tester"], grade) if failed else ()
+        kind = self._kind(number, _body(text["tester"]), grade) if failed else ()
         return PlayedPoint(grade, failed, kind, tuple(read(text["situations"])))
 
-    def _kind(self, number: int, tester: str, impact: float) -> tuple[object, ...]:
+    def _failure(self, number: int) -> Failure:
+        """The body that the ego failed in an episode."""
+        bodies, body = self.spaces[number].played(self.points[number]), self._testers[number]
+        place, programme = bodies[body]
+        others = sum(one is not None for _, one in bodies) - (programme is not None)
+        return Failure(place, programme, others)
+
+    def _kind(self, number: int, body: int, impact: float) -> tuple[object, ...]:
         """Impact speed, side and place of a failure, by which failures are alike."""
-        body = int(tester.removeprefix("tester")) if tester.startswith("tester") else 0
         place = self.spaces[number].place(self.points[number], body)
-        return impact // SPEED_BIN_MPS, place.left, place.along // PLACE_BIN_M
+        return impact // SPEED_BIN_MPS, place.whence, place.along // PLACE_BIN_M
+
+
+def _body(tester: str) -> int:
+    """The number of the body that a row names; the first one if it names none of the testers."""
+    return int(tester.removeprefix("tester")) if tester.startswith("tester") else 0

@@ -72,6 +72,7 @@ class Ego:
             safe.
         sees_background: whether it uses the background traffic in the snapshots. See
             ``Agent.sees_background``.
+        decides_every_s: time between two decisions, if that is longer than a timestep [s].
         outside: whether it drives from another process, which a branch of an episode would share.
     """
 
@@ -80,6 +81,7 @@ class Ego:
     kind: Kind = EGO_KIND
     depart_speed: float | None = None
     sees_background: bool = True
+    decides_every_s: float = 0.0
     outside: ClassVar[bool] = False
 
     def vtype(self) -> dict[str, str]:

@@ -52,6 +52,7 @@ class SumoEgo(Ego):
         )
         reaction = _reaction(self.name, reaction_s, attributes.pop("actionStepLength", None))
         self.attributes = {"carFollowModel": carFollowModel, **attributes}
+        self.decides_every_s = reaction
         if reaction:
             self.attributes["actionStepLength"] = reaction
 

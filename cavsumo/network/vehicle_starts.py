@@ -84,23 +84,66 @@ def _draw(
     rng: np.random.Generator,
 ) -> Start:
     """A start on an approach, in time for the ego unless it may be anywhere."""
-    meets = math.isfinite(approach.wait)
-    top = min(kind.v_max, approach.speed)
-    if not meets:
-        top = min(top, approach.ego_speed)
-    v = float(rng.uniform(*(SLOW if approach.type == "following" else CALM))) * top
-    if start_speed is not None:
-        v = min(kind.v_max, start_speed)
+    pace = float(rng.uniform(*pace_range(approach)))
+    lead = float(rng.uniform(*lead_range(approach)))
+    if not anywhere:
+        return vehicle_start(approach, kind, ego.length, pace, lead, start_speed)
+    v = _speed(approach, kind, pace, start_speed)
+    return _placed(approach, float(rng.uniform(*_room(approach, kind))), v, start_speed)
+
+
+def pace_range(approach: Approach) -> tuple[float, float]:
+    """The interval of a vehicle's speed, as a share of what it may drive."""
+    return SLOW if approach.type == "following" else CALM
+
+
+def lead_range(approach: Approach) -> tuple[float, float]:
+    """The interval of the time by which a vehicle arrives earlier, or drives ahead [s]."""
+    return EARLIER_S if math.isfinite(approach.wait) else AHEAD_S
+
+
+def vehicle_start(
+    approach: Approach,
+    kind: Kind,
+    ego_length: float,
+    pace: float,
+    lead: float,
+    start_speed: float | None = None,
+) -> Start:
+    """The start on an approach from which a vehicle meets the ego.
+
+    Args:
+        pace: its speed as a share of what it may drive (``pace_range``).
+        lead: how much earlier than the ego it arrives, or how far ahead it drives [s].
+        start_speed: in place of the pace [m/s].
+    """
+    v = _speed(approach, kind, pace, start_speed)
     until = approach.ego_enter / approach.ego_speed  # when the ego is there [s]
-    if meets:
-        until -= float(rng.uniform(*EARLIER_S))
-        along = min(approach.enter - v * until, approach.wait)
+    if math.isfinite(approach.wait):
+        along = min(approach.enter - v * (until - lead), approach.wait)
     else:
-        lead = float(rng.uniform(*AHEAD_S)) * approach.ego_speed
-        along = approach.enter + lead + (ego.length + kind.length) / 2 - v * until
-    first, last = kind.length / 2, min(approach.wait, approach.path.length - kind.length / 2)
-    along = float(rng.uniform(first, last)) if anywhere else max(first, min(along, last))
-    if meets and start_speed is None:
+        ahead = lead * approach.ego_speed
+        along = approach.enter + ahead + (ego_length + kind.length) / 2 - v * until
+    first, last = _room(approach, kind)
+    return _placed(approach, max(first, min(along, last)), v, start_speed)
+
+
+def _speed(approach: Approach, kind: Kind, pace: float, start_speed: float | None) -> float:
+    """The speed of a vehicle on its way to the ego [m/s]."""
+    if start_speed is not None:
+        return min(kind.v_max, start_speed)
+    top = min(kind.v_max, approach.speed)
+    return pace * (top if math.isfinite(approach.wait) else min(top, approach.ego_speed))
+
+
+def _room(approach: Approach, kind: Kind) -> tuple[float, float]:
+    """The interval of arc lengths in which a vehicle may start [m]."""
+    return kind.length / 2, min(approach.wait, approach.path.length - kind.length / 2)
+
+
+def _placed(approach: Approach, along: float, v: float, start_speed: float | None) -> Start:
+    """A start at an arc length; a vehicle that waits there is no faster than it can stop."""
+    if math.isfinite(approach.wait) and start_speed is None:
         v = min(v, math.sqrt(2.0 * BRAKING_MPS2 * max(0.0, approach.wait - along)))
     x, y, o = approach.path.at(along)
     return Start(x, y, o, approach=approach, v=v)

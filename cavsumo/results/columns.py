@@ -291,7 +291,8 @@ _ALL = (
     Column(
         "arrived",
         "1 if the ego came to the end of its route, 0 if not although the episode lasted to its "
-        "end; empty if a verdict ended the episode before",
+        "end; empty if a verdict ended the episode before, or that nobody could meet the ego any "
+        "more",
         "",
         _driven(lambda ego: None if ego.arrived is None else int(ego.arrived)),
         since="0.2",
@@ -313,7 +314,8 @@ _ALL = (
     Column(
         "lost_s",
         "time that the ego lost against a free drive to the same place: on an empty road, at the "
-        "speed limits, without lights (docs/results.md); negative if it was faster",
+        "speed limits, without lights (docs/results.md); negative if it was faster; empty where a "
+        "search ended the episode because nobody could meet the ego any more",
         "s",
         _driven(lambda ego: ego.lost),
         since="0.2",

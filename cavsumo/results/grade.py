@@ -12,8 +12,9 @@ Every episode has one, triggered or not, so a search can climb from nobody met t
 -5          invalid: a tester broke the rules of the world
 ==========  ====================================================================================
 
-The margin is the smallest gap between the moving ego and a tester, in the time that the ego needs
-for it: who passes somebody closely and fast has as little of it as who stops late.
+The margin is the smallest gap between the moving ego and a tester that is not behind it, in the
+time that the ego needs for it: who passes somebody closely and fast has as little of it as who
+stops late.
 """
 
 from __future__ import annotations
@@ -26,6 +27,7 @@ from cavsumo.assertions.judgement import HELD, INVALID, UNFAIR, VIOLATED
 from cavsumo.model.geometry import gap
 
 if TYPE_CHECKING:
+    from cavsumo.model.snapshot import BodyState
     from cavsumo.simulation.avoidability import Avoidability
     from cavsumo.simulation.episode import Episode
 
@@ -67,9 +69,16 @@ def _margin(episode: Episode) -> float:
         v = max(SLOWEST_MPS, ego.v)
         for tester in snapshot.testers:
             apart = math.hypot(tester.x - ego.x, tester.y - ego.y)
-            if apart - ego.body.kind.reach - tester.body.kind.reach < least * v:
+            near = apart - ego.body.kind.reach - tester.body.kind.reach < least * v
+            if near and not _passed(ego, tester):
                 least = min(least, gap(ego.box, tester.box) / v)
     return least
+
+
+def _passed(ego: BodyState, tester: BodyState) -> bool:
+    """Whether a whole tester lies behind the ego's rear bumper."""
+    ahead = (tester.x - ego.x) * math.cos(ego.o) + (tester.y - ego.y) * math.sin(ego.o)
+    return ahead + tester.body.kind.reach < -ego.body.kind.length / 2
 
 
 def _short(avoidability: Avoidability) -> float:

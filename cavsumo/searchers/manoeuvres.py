@@ -1,7 +1,8 @@
-"""Manoeuvres that pedestrians are known for, as distributions over the space of tests.
+"""Manoeuvres for which people on the road are known, as distributions over the space of tests.
 
 A search begins here: a blindly timed crossing, somebody slow or oblique, who hesitates, turns back,
-or walks along the lane and turns in. Every number that a manoeuvre leaves open is uniform.
+or walks along the lane and turns in; a vehicle that runs the line, creeps over it or stands in the
+way; and two that act together. Every number that a manoeuvre leaves open is uniform.
 """
 
 from __future__ import annotations
@@ -11,8 +12,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from cavsumo.searchers.drives import THROUGH as ON_SHARE
 from cavsumo.searchers.protocol import GENERATION, PlayedPoint
-from cavsumo.searchers.space import Point, Space
+from cavsumo.searchers.space import ALONE, AS_IT_BRAKES, TOGETHER, Point, Space
 
 Range = tuple[float, float]
 STRAIGHT: Range = (0.45, 0.55)
@@ -20,8 +22,9 @@ THROUGH: Range = (0.98, 1.0)
 LATE: Range = (0.15, 0.5)  # as an ego that did not react before could hardly stop
 EARLY: Range = (0.2, 1.0)
 SHORT: Range = (0.1, 0.4)  # as an ego that keeps its speed could not stop any more
+ON: Range = (ON_SHARE, 1.0)  # without a stop
 
-# For each manoeuvre the ranges of some coordinates of ``walks.Walks``.
+# For each manoeuvre the ranges of some coordinates of ``walks.Walks`` and ``drives.Drives``.
 WALKS: Mapping[str, Mapping[str, Range]] = {
     "crosses": {"zone": LATE, "speed": (0.5, 1.0), "heading": STRAIGHT, "depth": THROUGH},
     "crosses slowly": {"zone": LATE, "speed": (0.0, 0.35), "heading": STRAIGHT, "depth": THROUGH},
@@ -33,25 +36,57 @@ WALKS: Mapping[str, Mapping[str, Range]] = {
         "length_2": (0.7, 1.0), "heading_3": (0.3, 0.5),
     },
     "hesitates": {
-        "zone": EARLY, "depth": (0.05, 0.4), "resume": (0.1, 0.5), "heading_2": STRAIGHT,
+        "zone": EARLY, "depth": (0.05, 0.4), "resume": (0.1, 0.4), "heading_2": STRAIGHT,
         "heading_3": STRAIGHT,
     },
     "waits on the road": {
-        "zone": EARLY, "depth": (0.0, 0.35), "resume": (0.55, 0.8), "heading_2": STRAIGHT,
+        "zone": EARLY, "depth": (0.0, 0.35), "resume": (0.43, 0.58), "heading_2": STRAIGHT,
         "heading_3": STRAIGHT,
     },
     "turns back": {
-        "zone": EARLY, "depth": (0.6, 0.97), "resume": (0.0, 0.3), "heading_2": (0.85, 1.0),
+        "zone": EARLY, "depth": (0.6, 0.97), "resume": (0.0, 0.25), "heading_2": (0.85, 1.0),
         "length_2": (0.3, 1.0), "heading_3": (0.9, 1.0),
     },
     "turns in": {
         "zone": EARLY, "depth": (0.0, 0.35), "resume": (0.0, 0.15), "heading_2": (0.15, 0.3),
         "heading_3": (0.4, 0.6), "length_2": (0.1, 0.8),
     },
-    "stands": {"zone": EARLY, "depth": (0.35, 0.8), "resume": (0.4, 0.5)},
+    "stands": {"zone": EARLY, "depth": (0.35, 0.8), "resume": (0.32, 0.4)},
 }  # fmt: skip
+DRIVES: Mapping[str, Mapping[str, Range]] = {
+    "does not stop": {"zone": (0.1, 0.6), "speed": (0.5, 1.0), "effort": (0.5, 1.0), "depth": ON},
+    "does not stop, slowly": {"zone": (0.1, 0.6), "speed": (0.0, 0.4), "depth": ON},
+    "stops in the way": {"zone": EARLY, "depth": (0.28, 0.55), "resume": (0.3, 0.4)},
+    "creeps": {"zone": EARLY, "speed": (0.0, 0.3), "depth": (0.15, 0.3), "resume": (0.3, 0.4)},
+    "hesitates": {"zone": EARLY, "depth": (0.1, 0.28), "resume": (0.1, 0.4)},
+    "waits for the ego": {"zone": EARLY, "depth": (0.1, 0.28), "resume": (0.43, 0.58)},
+    "goes on as the ego brakes": {"zone": EARLY, "depth": (0.1, 0.28), "resume": (0.7, 0.85)},
+}
 # By the name of the movements.
-MANOEUVRES: Mapping[str, Mapping[str, Mapping[str, Range]]] = {"walks": WALKS}
+MANOEUVRES: Mapping[str, Mapping[str, Mapping[str, Range]]] = {"walks": WALKS, "drives": DRIVES}
+
+# Two that act together: ranges of the first and of the second.
+NEAR: Mapping[str, Range] = {"company": (TOGETHER, 1.0), "reaction": (0.0, AS_IT_BRAKES)}
+PAIRS: Mapping[str, Sequence[tuple[Mapping[str, Range], Mapping[str, Range]]]] = {
+    "walks": (
+        (WALKS["hesitates"], {**NEAR, **WALKS["crosses"], "zone": (0.0, 0.6)}),
+        (WALKS["waits on the road"], {**NEAR, **WALKS["crosses"], "zone": (0.0, 0.6)}),
+        (WALKS["crosses"], {**NEAR, **WALKS["crosses slowly"], "zone": (0.1, 0.6)}),
+        (WALKS["stands"], {**NEAR, **WALKS["comes towards"], "zone": (0.1, 0.6)}),
+        (
+            {**WALKS["crosses"], "zone": EARLY},
+            {**NEAR, **WALKS["crosses"], "reaction": (AS_IT_BRAKES, 1.0), "zone": (0.0, 0.5)},
+        ),
+    ),
+    "drives": (
+        (DRIVES["hesitates"], {**NEAR, **DRIVES["does not stop"], "zone": (0.0, 0.6)}),
+        (DRIVES["creeps"], {**NEAR, **DRIVES["does not stop"], "zone": (0.0, 0.6)}),
+        (
+            {**DRIVES["does not stop"], "zone": EARLY},
+            {"company": (ALONE, 1.0), **DRIVES["does not stop"], "reaction": (AS_IT_BRAKES, 1.0)},
+        ),
+    ),
+}
 
 
 @dataclass
@@ -70,10 +105,13 @@ class ManoeuvreSearch:
         """Nothing is learned."""
 
     def _drawn(self) -> Point:
-        point = self.rng.random(self.space.dimension)
-        known = list(MANOEUVRES[self.space.movements.name].values())
-        for i in range(self.space.bodies):
-            for name, (low, high) in known[(self.turn + i) % len(known)].items():
-                point[self.space.index(i, name)] = self.rng.uniform(low, high)
+        point, name = self.rng.random(self.space.dimension), self.space.movements.name
+        known, pairs = list(MANOEUVRES[name].values()), PAIRS[name]
+        chosen = [known[(self.turn + i) % len(known)] for i in range(self.space.bodies)]
+        if self.turn % 2 and self.space.bodies > 1:
+            chosen[:2] = pairs[self.turn // 2 % len(pairs)]
+        for i, ranges in enumerate(chosen):
+            for coordinate, (low, high) in ranges.items():
+                point[self.space.index(i, coordinate)] = self.rng.uniform(low, high)
         self.turn += 1
         return point

@@ -9,7 +9,7 @@ from typing import Any, NamedTuple, Protocol
 import numpy as np
 
 from cavsumo.agents.decisions import Situation
-from cavsumo.agents.programme import WalkProgramme
+from cavsumo.agents.searched import Programme
 from cavsumo.searchers.places import Place
 from cavsumo.searchers.space import Point, Space
 
@@ -45,8 +45,8 @@ class PointSpace(Protocol):
     def place(self, point: Point, body: int) -> Place:
         """Where a body starts."""
 
-    def seen(self, point: Point) -> list[tuple[Place, WalkProgramme]]:
-        """Places and programmes of the bodies that take part."""
+    def played(self, point: Point) -> list[tuple[Place, Programme | None]]:
+        """The place and the programme of every body, None for one that stands by."""
 
 
 class Searcher(Protocol):

@@ -3,25 +3,31 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import ClassVar
 
-from cavsumo.agents.programme import WalkProgramme, entry_of, zone_m
+from cavsumo.agents.cues import zone_m
+from cavsumo.agents.programme import WalkProgramme, entry_of
 from cavsumo.errors import NetworkError
 from cavsumo.model.bodies import CAR, Kind
 from cavsumo.model.carriageway import Limit, Start
 from cavsumo.network.pedestrian_starts import APART_M, starting_range
 from cavsumo.network.site import Site
-from cavsumo.searchers.places import NEAREST_M, Place, within
+from cavsumo.searchers.places import (
+    FROM_LEFT,
+    FROM_RIGHT,
+    NEAREST_M,
+    Place,
+    pause_of,
+    within,
+)
 
 PLACE_M = 0.5  # distance of two places along a pavement
 SLOWEST_MPS = 0.3
 OBLIQUE_RAD = math.radians(60.0)  # of the first leg, to either side
 ZONES = (-0.8, 1.6)  # where an ego that does not react would be as a body comes into its way
-RESUMED = (-0.5, 2.5)  # where it is as a body goes on
 DEPTHS_M = (-1.5, 3.0)
-LONGEST_PAUSE_S = 2.0
 LONGEST_M = 5.0  # of the second leg
 
 
@@ -34,10 +40,18 @@ class Walks:
     limits: tuple[Limit, ...] = ()
 
     name: ClassVar[str] = "walks"
-    names: ClassVar[tuple[str, ...]] = (
-        "place", "zone", "speed", "heading", "depth", "resume", "speed_2", "heading_2", "length_2",
-        "heading_3",
-    )  # fmt: skip
+    meanings: ClassVar[Mapping[str, str]] = {
+        "place": "where it starts, along the pavements of the ego's route",
+        "zone": "where the ego will be as it comes into the ego's way",
+        "speed": "of the first leg",
+        "heading": "of the first leg, from towards the ego to away from it",
+        "depth": "how far in the ego's way the first leg ends",
+        "resume": "when it goes on",
+        "speed_2": "of the second leg",
+        "heading_2": "of the second leg",
+        "length_2": "of the second leg",
+        "heading_3": "of the last leg",
+    }
     manner: ClassVar[tuple[str, ...]] = ("speed", "heading", "depth")
 
     def suited(self, shares: Mapping[str, float]) -> tuple[Place, ...]:
@@ -54,27 +68,29 @@ class Walks:
 
     def _in_time(self, walk: WalkProgramme, place: Place) -> bool:
         """Whether the ego is still to come when a body has to step off for its programme."""
+        if isinstance(walk.cue, str):
+            return True
         entry, shift = entry_of(walk, place.away, self.kind)
         v = [0.0, *(one.speed for one in self.limits if one.along <= place.along)][-1]
-        return place.along + shift >= v * entry + zone_m(walk.zone, v)
+        return place.along + shift >= v * entry + zone_m(walk.cue, v)
 
-    def apart(self, one: Place, other: Place) -> bool:
-        """Whether two bodies can start at two places."""
-        a, b = one.start, other.start
-        return math.dist((a.x, a.y), (b.x, b.y)) > APART_M
+    def fits(self, place: Place, others: Sequence[Place]) -> bool:
+        """Whether a body can start at a place, apart from others."""
+        x, y = place.start.x, place.start.y
+        return all(math.dist((x, y), (o.start.x, o.start.y)) > APART_M for o in others)
 
 
 def walk_of(shares: Mapping[str, float], kind: Kind) -> WalkProgramme:
     """The programme of the numbers of one body, each in [0, 1]."""
-    speeds, resume = (SLOWEST_MPS, kind.v_max), shares["resume"]
-    waits = resume > 0.5
+    speeds = SLOWEST_MPS, kind.v_max
+    pause, resume = pause_of(shares["resume"])
     return WalkProgramme(
-        zone=within(ZONES, shares["zone"]),
+        cue=within(ZONES, shares["zone"]),
         speed=within(speeds, shares["speed"]),
         heading=within((-OBLIQUE_RAD, OBLIQUE_RAD), shares["heading"]),
         depth=within(DEPTHS_M, shares["depth"]),
-        pause=0.0 if waits else max(0.0, resume - 0.1) / 0.4 * LONGEST_PAUSE_S,
-        resume=within(RESUMED, 2.0 * resume - 1.0) if waits else None,
+        pause=pause,
+        resume=resume,
         speed_2=within(speeds, shares["speed_2"]),
         heading_2=within((-math.pi, math.pi), shares["heading_2"]),
         length_2=LONGEST_M * shares["length_2"],
@@ -107,5 +123,6 @@ def _places(site: Site, kind: Kind) -> list[Place]:
             strip = met[0] - (CAR.width + kind.length) / 2
             left = math.sin(site.route.path.at(met[1])[2] - way.heading) > 0.0
             start = Start(x, y, o, area.pavement, 0.0, True, area.walk)
-            found.append(Place(start, left, met[1], max(0.0, strip)))
+            side = FROM_LEFT if left else FROM_RIGHT
+            found.append(Place(start, side, met[1], away=max(0.0, strip)))
     return found

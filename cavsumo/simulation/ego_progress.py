@@ -39,7 +39,8 @@ class EgoProgress:
         driven: the distance along its path [m].
         time: the duration of the episode [s].
         lost: how much of that the free drive to the same place would have saved [s]; negative for
-            an ego that is faster; None without speed limits to compare with.
+            an ego that is faster; None without speed limits to compare with, and where the episode
+            was cut.
         stood: total time of standing [s].
         stood_last: time of standing until the end [s].
     """
@@ -65,8 +66,13 @@ class EgoProgress:
         return CRAWLED if slow and moved >= LASTING_S - 1e-9 else ""
 
 
-def ego_progress(scene: Scene, history: Sequence[Snapshot], arrived: bool | None) -> EgoProgress:
-    """The progress of the ego in the snapshots of an episode."""
+def ego_progress(
+    scene: Scene, history: Sequence[Snapshot], arrived: bool | None, *, cut: bool = False
+) -> EgoProgress:
+    """The progress of the ego in the snapshots of an episode.
+
+    ``cut``: it ended although the ego could drive on, so that what it would have lost is not known.
+    """
     first, last = history[0], history[-1]
     path = scene.ego_path
     begin, end = (path.project(s.ego.x, s.ego.y).along for s in (first, last))
@@ -78,7 +84,7 @@ def ego_progress(scene: Scene, history: Sequence[Snapshot], arrived: bool | None
         arrived,
         driven=end - begin,
         time=time,
-        lost=None if free is None else time - free,
+        lost=None if free is None or cut else time - free,
         stood=sum(standing) * scene.dt,
         stood_last=(len(standing) if moved_last is None else moved_last) * scene.dt,
     )

@@ -17,9 +17,10 @@ from cavsumo.assertions.validity import ValidityMonitor
 from cavsumo.egos.base import Drive, Ego
 from cavsumo.model.bodies import Action
 from cavsumo.model.departures import Demand
+from cavsumo.model.left_behind import LeftBehind
 from cavsumo.model.snapshot import Snapshot
 from cavsumo.simulation.ego_progress import ego_progress
-from cavsumo.simulation.ending import at_end, over
+from cavsumo.simulation.ending import all_behind, at_end, over
 from cavsumo.simulation.episode import Episode, Joint
 from cavsumo.simulation.moving import moved
 from cavsumo.simulation.rewards import Feedback, RewardMonitor
@@ -68,10 +69,11 @@ class EpisodeLoop:
         self._episode = Episode(Judgement(""), starts=begun.starts, waited=begun.waited)
         self._episode.forecast = _foretold(agents, self.agent_views)
         self._validity = ValidityMonitor(self.scene)
+        self._behind = LeftBehind(self.scene)
         self.history: list[Snapshot] = self._episode.seen  # for blame, progress and grade
         self._chosen: list[Joint] = []
         self._keep(record or keep)
-        self._arrived = False
+        self._arrived = self._cut = False
         self._learners = _learn(agents)
         self._observe(self.snapshot)
         self._end(over(setup, self.snapshot))
@@ -105,7 +107,11 @@ class EpisodeLoop:
         if self._learners:
             _feed_back(agents, views, actions, rewards, self.agent_views)
         self.snapshot = successor
-        self._end(over(setup, successor))
+        ended = over(setup, successor)
+        self._cut = not (ended or episode.drives) and all_behind(
+            setup, agents, self._behind, successor
+        )
+        self._end(ended or self._cut)
         return rewards
 
     def hand_over(
@@ -175,7 +181,7 @@ class EpisodeLoop:
         spoilt = self._validity.spoils(episode.judgement)
         late = self.snapshot.time >= self.setup.scenario.end - 1e-9
         arrived = True if self._arrived else False if late else None
-        episode.progress = ego_progress(self.scene, self.history, arrived)
+        episode.progress = ego_progress(self.scene, self.history, arrived, cut=self._cut)
         episode.invalid, episode.breach = spoilt is not None, spoilt or self._validity.first
         if episode.outcome == VIOLATED:
             episode.blame = blamed(self.scene, self.history, episode.judgement)

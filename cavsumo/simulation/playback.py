@@ -56,7 +56,12 @@ def doing(actions: Sequence[Joint], teams: int) -> list[RecordedAgent]:
 
 
 def playback(
-    setup: Setup, played: Recorded, *, record: bool = False, alike: Sequence[Agent] = ()
+    setup: Setup,
+    played: Recorded,
+    *,
+    record: bool = False,
+    alike: Sequence[Agent] = (),
+    ends: bool = False,
 ) -> EpisodeLoop:
     """A recorded episode, about to be played again.
 
@@ -64,8 +69,11 @@ def playback(
         setup: that of the record, but perhaps for the ego and the assertions.
         record: keep every snapshot, and show everybody in it.
         alike: agents that look at as much of the background as those that play; one for each team.
+        ends: the testers rest behind the end of the record, so that the episode ends there again.
     """
     agents = played.agents(setup.teams)
+    for agent in agents:
+        agent.ends = ends
     for agent, other in zip(agents, alike, strict=bool(alike)):
         agent.sees_background = other.sees_background
     return EpisodeLoop(setup, agents, played.seed, record=record, demand=played.departures)
@@ -73,4 +81,4 @@ def playback(
 
 def played_back(setup: Setup, played: Recorded) -> Episode:
     """A recorded episode played again as a whole, every snapshot and action kept."""
-    return played_on(playback(setup, played, record=True))
+    return played_on(playback(setup, played, record=True, ends=True))

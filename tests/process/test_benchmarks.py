@@ -73,6 +73,15 @@ def test_every_benchmark_is_played_here() -> None:
     assert scripts == set(re.findall(r'play\(\s*"(\w+)"', here))
 
 
+def test_early_end(play: Play) -> None:
+    """The same is learned of every point, in less time."""
+    found = play("early_end", "--net", NET, "--ego", "constant", "--runs", "30").splitlines()[1]
+    runs, cut, differ, whole, shorter = numbers(found)[:5]
+    assert (runs, differ) == (30, 0)
+    assert cut > 0
+    assert shorter < whole
+
+
 def test_reference_tracks(play: Play) -> None:
     """One cell: the largest differences are within the tolerances."""
     test, everything = play("reference_tracks", "--only", "CPFA/60/50").splitlines()[1:]

@@ -109,7 +109,7 @@ def test_the_summary_names_common_features(tmp_path: Path, capsys: Capture) -> N
     said = capsys.readouterr().out
     assert "distinct, in 10 episodes and" in said
     assert "the first after" in said
-    assert "in common: from " in said
+    assert "in common: pedestrian from " in said
     assert main([*words, "-o", str(tmp_path / "b.csv"), "--ego", "time-gap", "--exit-zero"]) == 0
     said = capsys.readouterr().out
     assert "search: no preventable failure in 10 episodes" in said
@@ -147,12 +147,30 @@ def test_an_earlier_search_of_another_space_is_refused(
     assert not list(tmp_path.iterdir())
 
 
+def test_an_episode_ends_when_nobody_can_meet_the_ego(tmp_path: Path, capsys: Capture) -> None:
+    """Outcomes and grades are those of the whole episodes; that the ego arrived is not known."""
+    files = tmp_path / "cut.csv", tmp_path / "whole.csv"
+    for file, words in zip(files, ([], ["--param", "cut=false"]), strict=True):
+        _search(file, "--method", "random", "--trace", "all", *words)
+    cut, whole = map(rows, files)
+    learned = "outcome", "verdicts", "avoidable", "impact_speed_mps", "trigger_time_s", "grade"
+    assert [[r[c] for c in learned] for r in cut] == [[r[c] for c in learned] for r in whole]
+    shorter = [i for i, r in enumerate(cut) if float(r["time_s"]) < float(whole[i]["time_s"])]
+    assert shorter
+    for i in shorter:
+        assert (cut[i]["arrived"], cut[i]["lost_s"], whole[i]["arrived"]) == ("", "", "1")
+    for words in ([], ["--playback"]):
+        capsys.readouterr()
+        assert main(["replay", str(files[0]), str(shorter[0]), *words]) == 0
+        assert "the same" in capsys.readouterr().out
+
+
 @pytest.mark.parametrize(
     ("words", "said"),
     [
         (["--method", "explor"], "unknown method 'explor'; did you mean 'explore'?"),
         (["--param", "search.method=tre"], "unknown method 'tre'; did you mean 'tree'?"),
-        (["--kind", "car"], "agent search can only walk"),
+        (["--kind", "car", "--method", "tree"], "search.method tree: decides for pedestrian"),
         (["--shard", "1/2"], "shard 1/2: search"),
     ],
 )
@@ -169,7 +187,9 @@ def test_a_search_that_is_impossible_is_refused(
 def test_the_space_is_derived_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """The check of a batch and its search share it."""
     derived = []
-    monkeypatch.setattr(prepared, "space_of", lambda *a: derived.append(a) or space_of(*a))
+    monkeypatch.setattr(
+        prepared, "space_of", lambda *a, **b: derived.append(a) or space_of(*a, **b)
+    )
     assert _search(tmp_path / "found.csv", "--exit-zero", runs=2) == 0
     assert len(derived) == 1
 

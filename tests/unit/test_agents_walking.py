@@ -349,9 +349,9 @@ def test_a_programme_enters_the_strip_at_its_zone(
     programme = WalkProgramme(zone, 1.4, 0.0, 3.0, 0.0, None, 1.3, 0.0, 5.0, 0.0)
     programme = programme._replace(**walk)
     if programme.resume is not None:
-        programme = programme._replace(zone=1.6, resume=zone)
+        programme = programme._replace(cue=1.6, resume=zone)
     agent = SearchAgent()
-    agent.remember({"starts": [], "programmes": [list(programme)]})
+    agent.remember({"starts": [], "programmes": [programme._asdict()]})
     start = scene.starts[0]
     first, ego = (start.x, start.y, 0.0, start.o), (2.25, LANE, SPEED, 0.0)
     for snapshot in played(scene, agent, first, ego, 94.0 / SPEED):

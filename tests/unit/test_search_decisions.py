@@ -78,8 +78,9 @@ def test_a_point_that_begins_like_another_one_repeats_it(space: DecisionSpace) -
     second = space.completed(rng, space.rows(first)[:4])
     (one,), (other,) = space.memories(first), space.memories(second)
     assert one["starts"] == other["starts"]
-    (arrival, chosen), (arrival_2, chosen_2) = one["programmes"][0], other["programmes"][0]
-    assert arrival == arrival_2
+    (before, after) = one["programmes"][0], other["programmes"][0]
+    assert before["arrival"] == after["arrival"]
+    chosen, chosen_2 = before["chosen"], after["chosen"]
     assert chosen[:3] == chosen_2[:3]
     assert chosen[3:] != chosen_2[3:]
     assert len(chosen) == DECISIONS
@@ -120,7 +121,7 @@ def test_a_walk_does_what_was_decided(straight_scene: Callable[..., Scene]) -> N
     arrival, v = 5.0, 1.2
     chosen = [Decision(0.0, v), Decision(0.0, 0.0), Decision(0.0, v)]
     agent = SearchAgent()
-    agent.remember({"starts": [], "programmes": [list(Decisions(arrival, chosen))]})
+    agent.remember({"starts": [], "programmes": [Decisions(arrival, chosen)._asdict()]})
     agent.reset(scene, [0], np.random.default_rng(1))
     start, states = scene.starts[0], list[BodyState]()
     state = BodyState(scene.bodies[0], start.x, start.y, 0.0, start.o)

@@ -11,18 +11,20 @@ from typing import Any
 import numpy as np
 import pytest
 
+from cavsumo.agents.searched import programme_of
 from cavsumo.assertions.judgement import HELD, NOT_TRIGGERED, UNFAIR, VIOLATED, Judgement
 from cavsumo.model.bodies import PEDESTRIAN
-from cavsumo.model.carriageway import Limit
+from cavsumo.model.carriageway import Limit, Start
 from cavsumo.model.scenario import BatchPlan
 from cavsumo.network.site import Site
 from cavsumo.results.grade import INVALID_GRADE, grade
 from cavsumo.searchers.manoeuvres import MANOEUVRES, ManoeuvreSearch
 from cavsumo.searchers.methods import SEARCHERS, searcher_of
+from cavsumo.searchers.places import Place
 from cavsumo.searchers.protocol import GENERATION, PlayedPoint
 from cavsumo.searchers.space import Point, Space, space_of
 from cavsumo.searchers.walks import Walks, walk_of
-from cavsumo.searchers.words import in_common
+from cavsumo.searchers.words import Failure, in_common
 from cavsumo.simulation.avoidability import Avoidability
 
 SIDES = (False, True)  # from the right, from the left
@@ -46,15 +48,15 @@ def test_a_place_is_beside_the_path(space: Space) -> None:
 
 
 def test_a_point_is_starts_and_programmes(space: Space) -> None:
-    """Each body its own; the second takes part below one half of its last number."""
-    point = np.full(space.dimension, 0.25)
+    """Each body its own; the second stands by where its company is small."""
+    point = np.full(space.dimension, 0.3)
     first, second = space.memories(point)
     assert len(first["starts"]) == len(second["starts"]) == 1
     assert first["programmes"] == second["programmes"]
-    assert len(first["programmes"][0]) == len(Walks.names)
+    assert programme_of(first["programmes"][0]) == space.seen(point)[0][1]
     (x, y), (u, v) = (memory["starts"][0][:2] for memory in (first, second))
     assert math.dist((x, y), (u, v)) > 1.2  # the place was taken
-    point[-1] = 0.75
+    point[space.index(1, "company")] = 0.2
     assert space.memories(point)[1]["programmes"] == [None]
     assert len(space.seen(point)) == 1
 
@@ -67,12 +69,12 @@ def test_every_number_of_a_point_has_a_body_and_a_name(space: Space) -> None:
     for i, (body, name) in enumerate(space.coordinates):
         assert space.share(point, body, name) == point[i]
     with pytest.raises(KeyError):
-        space.index(0, "presence")  # the first body always takes part
+        space.index(0, "company")  # the first body always takes part
 
 
 def test_a_slow_body_starts_where_it_is_in_time(space: Space) -> None:
     """The longer it walks to the ego's strip, the farther along the path; all if nowhere."""
-    quick = {name: 0.5 for name in space.movements.names} | {"speed": 1.0, "depth": 1.0}
+    quick = {name: 0.5 for name in space.movements.meanings} | {"speed": 1.0, "depth": 1.0}
     slow = quick | {"speed": 0.5}
     firsts: list[dict[bool, float]] = []
 
@@ -92,9 +94,9 @@ def test_a_slow_body_starts_where_it_is_in_time(space: Space) -> None:
 def test_a_programme_stays_within_natural_limits() -> None:
     """At the corners of the cube, and the pause ends by time or by the place of the ego."""
     rng = np.random.default_rng(1)
-    size = len(Walks.names)
+    size = len(Walks.meanings)
     for numbers in [[0.0] * size, [1.0] * size, *rng.random((50, size)).tolist()]:
-        walk = walk_of(dict(zip(Walks.names, numbers, strict=True)), PEDESTRIAN)
+        walk = walk_of(dict(zip(Walks.meanings, numbers, strict=True)), PEDESTRIAN)
         for speed in (walk.speed, walk.speed_2):
             assert 0.3 <= speed <= PEDESTRIAN.v_max
         assert abs(walk.heading) < math.pi / 2
@@ -130,7 +132,8 @@ def test_points_depend_on_seed_and_results_alone(space: Space, method: str) -> N
 @pytest.mark.parametrize("method", ["portfolio", "neighbours", "cma"])
 def test_what_was_good_is_looked_at_more_closely(space: Space, method: str) -> None:
     """Later points are nearer to the failures than random ones."""
-    searcher = searcher_of(method, space, np.random.default_rng(5))
+    alone = dataclasses.replace(space, teams=((0,),))
+    searcher = searcher_of(method, alone, np.random.default_rng(5))
     grades: list[float] = []
     for _ in range(60):
         points = searcher.ask()
@@ -143,7 +146,7 @@ def test_what_was_good_is_looked_at_more_closely(space: Space, method: str) -> N
 def test_every_manoeuvre_is_within_the_space(space: Space) -> None:
     """Its numbers are numbers of the space, in [0, 1], and a round has all of them."""
     for ranges in MANOEUVRES[space.movements.name].values():
-        assert set(ranges) <= set(space.movements.names)
+        assert set(ranges) <= set(space.movements.meanings)
         assert all(0.0 <= low <= high <= 1.0 for low, high in ranges.values())
     drawn = [p for _ in range(2) for p in ManoeuvreSearch(space, np.random.default_rng(1)).ask()]
     assert all((point >= 0.0).all() and (point <= 1.0).all() for point in drawn)
@@ -151,13 +154,14 @@ def test_every_manoeuvre_is_within_the_space(space: Space) -> None:
 
 def test_features_that_most_failures_share() -> None:
     """Side, speed, angle, manner."""
-    walk = walk_of(dict.fromkeys(Walks.names, 0.5), PEDESTRIAN)
+    walk = walk_of(dict.fromkeys(Walks.meanings, 0.5), PEDESTRIAN)
     slow = walk._replace(speed=0.5, heading=-1.0, depth=3.0)
-    place: Any = SimpleNamespace(left=True)
-    assert in_common([(place, slow), (place, slow)]) == (
-        "from the left, 0.5 m/s, 57 degrees towards the ego, crosses the ego's way at once"
+    failure = Failure(Place(Start(0.0, 0.0, 0.0), "from the left", 30.0), slow)
+    assert in_common([failure, failure], "pedestrian") == (
+        "pedestrian from the left, 0.5 m/s, 57 degrees towards the ego, "
+        "crosses the ego's way at once, waits for the ego"
     )
-    assert in_common([]) == ""
+    assert in_common([], "pedestrian") == ""
 
 
 def _episode(judgement: Judgement, outcome: str = "", min_gap: float = 1.0) -> Any:
