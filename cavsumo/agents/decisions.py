@@ -13,7 +13,7 @@ from typing import NamedTuple
 
 from cavsumo.agents.avoidance import Avoidance
 from cavsumo.agents.planning.coordinates import meeting
-from cavsumo.agents.programme import BEYOND_M
+from cavsumo.agents.programme import BEYOND_M, ROUND_M
 from cavsumo.agents.walking import ApproachKerb, walk
 from cavsumo.model.bodies import Action
 from cavsumo.model.kinematics import wrap
@@ -94,8 +94,19 @@ class DecidedWalk:
         return self._avoidance.across(snapshot, state, wanted, heading)
 
     def reach(self, snapshot: Snapshot, state: BodyState) -> float:
-        """How far the body may come from where it is, wherever it walks [m]."""
-        return state.body.kind.v_max * max(0.0, self.scene.horizon - snapshot.time)
+        """How far the body may come from where it is, detours around others apart [m]."""
+        if self._met is None:
+            return ROUND_M + self._idle.left(state)
+        way, chosen = self._met.way, self.decisions.chosen[max(0, len(self.situations) - 1) :]
+        ahead = DECISION_S * sum(speed for _, speed in chosen)
+        if math.isinf(self._begun):
+            ahead += self._idle.left(state)
+        heading, speed = chosen[-1]
+        if speed > 0.0:
+            across = way.leave - way.enter + 2.0 * BEYOND_M
+            ahead += across / max(1e-9, abs(math.cos(heading)))
+        left = max(0.0, self.scene.horizon - snapshot.time)
+        return ROUND_M + min(ahead, state.body.kind.v_max * left)
 
     def _begins(self, snapshot: Snapshot) -> bool:
         """Whether the decisions have begun."""

@@ -34,7 +34,7 @@ AGENT_NAMES = Names(
         "proximity": "distance_m idle manoeuvre",
         "q-learning": "alpha gamma epsilon half_life hold_s weights learn",
         "random": "rate_per_s epsilon between",
-        "search": "method earlier cut",
+        "search": "method cut earlier",
         "timing": "aim idle manoeuvre",
     },
 )

@@ -35,6 +35,7 @@ from cavsumo.network.traffic import Volume
 from cavsumo.network.traffic_lights import Pace
 from cavsumo.results.present import input_files
 from cavsumo.results.provenance import checksums, traffic_checksum, unequal, versions
+from cavsumo.searchers.continued import SPACE, fingerprint
 from cavsumo.searchers.methods import check_method
 from cavsumo.searchers.space import Space, space_of
 from cavsumo.suites.cases import case_plan, case_plans, suite_inputs
@@ -297,7 +298,11 @@ def manifest(prepared: PreparedBatch) -> dict[str, Any]:
         "plan": prepared.plan.model_dump(mode="json"),
         "ego_route": list(prepared.site.route.edges),
         "junction": prepared.site.route.junction,
-        "sha256": dict(prepared.checksums) | traffic_checksum(prepared.site),
+        "sha256": {
+            **prepared.checksums,
+            **traffic_checksum(prepared.site),
+            **({SPACE: fingerprint(prepared.space)} if prepared.cast.searchers else {}),
+        },
         "versions": dict(prepared.versions),
         "sumo_options": dict(OPTIONS),
     }

@@ -2,41 +2,37 @@
 
 from __future__ import annotations
 
-import dataclasses
 from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
-from cavsumo.agents.casting import resolve_cast
-from cavsumo.agents.names import SEARCH
+from cavsumo.agents.casting import params_of
+from cavsumo.agents.names import SEARCH, SEARCH_METHODS
 from cavsumo.batch.jobs import Memory
 from cavsumo.batch.prepared import PreparedBatch
-from cavsumo.batch.searching import Searching
+from cavsumo.batch.searching import Searching, SearchOrder
 from cavsumo.errors import ResultsError
 from cavsumo.model.scenario import BatchPlan
+from cavsumo.results.provenance import unequal
 from cavsumo.results.reading import rows_of
 from cavsumo.results.recorded_plan import recorded_plan
+from cavsumo.searchers.continued import SPACE, fingerprint
 from cavsumo.searchers.protocol import GENERATION
-from cavsumo.searchers.space import Point
 
 EARLIER = 2 * GENERATION  # points of an earlier search
-SPACE = ("kind", "testers", "bodies_per_agent")  # settings that decide the space, besides the place
+SETTINGS = ("net", "kind", "testers", "bodies_per_agent", "start_speed")  # said of another space
 
 
 def search_of(prepared: PreparedBatch, label: str) -> Searching:
     """The search of one agent; raises ResultsError where an earlier one is of another space."""
-    earlier = prepared.cast[label].params.get("earlier")
-    if not earlier:
-        return Searching(prepared, label)
-    sort = type(Searching(prepared, label).searcher.space)
-    points = [point for space, point in _best(prepared, Path(str(earlier))) if type(space) is sort]
-    return Searching(prepared, label, points[:EARLIER])
+    return _search(prepared, prepared.plan, label, ())
 
 
 def check_earlier(prepared: PreparedBatch) -> None:
     """Raise ResultsError where a search of a batch cannot begin with the earlier one it names."""
-    for label in sorted(prepared.cast.searchers):
-        search_of(prepared, label)
+    for member in prepared.cast:
+        if member.searches and member.params.get("earlier"):
+            search_of(prepared, member.label)
 
 
 def searched(
@@ -53,17 +49,38 @@ def searched(
     return search.memory(run)
 
 
-def _best(prepared: PreparedBatch, file: Path) -> list[tuple[Any, Point]]:
-    """The points of an earlier search with their spaces: the best of each kind, then the others."""
+def _search(
+    prepared: PreparedBatch, plan: BatchPlan, label: str, later: tuple[Path, ...]
+) -> Searching:
+    """The search of an agent of a plan in the space of a batch.
+
+    ``later``: the files of the searches that begin with this one.
+    """
+    params = params_of(plan, label)
+    method = str(params.get("method", SEARCH_METHODS[0]))
+    order = SearchOrder(label, method, plan.seed, list(plan.cast).index(label), len(plan.agents))
+    search = Searching(prepared.space, order)
+    if not params.get("earlier"):
+        return search
+    file = prepared.plan.scenario.present(Path(str(params["earlier"])))
+    if file in later:
+        raise ResultsError(f"search.earlier {str(file)!r}: begins with itself")
+    earlier = _earlier(prepared, file, later)
+    sort = type(search.searcher.space)
+    points = [point for space, point in earlier.best() if type(space) is sort]
+    return Searching(prepared.space, order, points[:EARLIER])
+
+
+def _earlier(prepared: PreparedBatch, file: Path, later: tuple[Path, ...]) -> Searching:
+    """An earlier search of the same space, told of its rows."""
     plan, manifest = recorded_plan(file)
     labels = [label for label, name in plan.cast.items() if name == SEARCH]
     if not labels:
         raise ResultsError(f"search.earlier {str(file)!r}: holds no search, only {plan.agents[0]}")
-    _check_space(prepared, plan, manifest, file)
-    then = dataclasses.replace(prepared, plan=plan, cast=resolve_cast(plan))
-    search = search_of(then, labels[0])
+    _check(prepared, plan, manifest, f"search.earlier {str(file)!r}")
+    search = _search(prepared, plan, labels[0], (*later, file))
     _tell(search, rows_of(file))
-    return search.best()
+    return search
 
 
 def _tell(search: Searching, rows: Iterable[Mapping[str, Any]]) -> None:
@@ -73,19 +90,19 @@ def _tell(search: Searching, rows: Iterable[Mapping[str, Any]]) -> None:
             search.told(row)
 
 
-def _check_space(
-    prepared: PreparedBatch, plan: BatchPlan, manifest: Mapping[str, Any], file: Path
+def _check(
+    prepared: PreparedBatch, plan: BatchPlan, manifest: Mapping[str, Any], name: str
 ) -> None:
-    """Refuse an earlier search with other bodies or at another place."""
-    name, own = f"search.earlier {str(file)!r}", prepared.plan.scenario
-    for key in SPACE:
-        was, is_ = getattr(plan.scenario, key), getattr(own, key)
+    """Refuse an earlier search of another space, or of a version that chose other points."""
+    for package, (was, is_) in unequal(manifest["versions"], prepared.versions):
+        raise ResultsError(f"{name}: its points were chosen with {package} {was}, not {is_}")
+    if manifest["sha256"].get(SPACE) == fingerprint(prepared.space):
+        return
+    for key in SETTINGS:
+        was, is_ = getattr(plan.scenario, key), getattr(prepared.plan.scenario, key)
         if was != is_:
-            raise ResultsError(f"{name}: is of another space: {key} was {was!r}, is {is_!r}")
-    nets = (manifest["sha256"].get(str(plan.scenario.net)), prepared.checksums.get(str(own.net)))
-    if nets[0] != nets[1]:
-        raise ResultsError(f"{name}: is of another network, {plan.scenario.net}, not {own.net}")
-    routes = list(manifest["ego_route"]), list(prepared.site.route.edges)
-    if routes[0] != routes[1]:
-        was, is_ = (" ".join(route) for route in routes)
-        raise ResultsError(f"{name}: is of another route of the ego, {was}, not {is_}")
+            raise ResultsError(f"{name}: is of another space: {key} was {was}, is {is_}")
+    raise ResultsError(
+        f"{name}: is of another space: the network, the ego's route or box, or how often the ego "
+        "decides was another one"
+    )

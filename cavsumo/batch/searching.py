@@ -17,14 +17,13 @@ import numpy as np
 
 from cavsumo.agents.decisions import read
 from cavsumo.batch.jobs import Memory
-from cavsumo.batch.prepared import PreparedBatch
 from cavsumo.results.alike import FEATURES, kind_of
 from cavsumo.results.grade import INVALID_GRADE
 from cavsumo.results.rows import cell
 from cavsumo.searchers.continued import ContinuedSearch
 from cavsumo.searchers.methods import searcher_of
 from cavsumo.searchers.protocol import PlayedPoint, PointSpace
-from cavsumo.searchers.space import Point
+from cavsumo.searchers.space import Point, Space
 from cavsumo.searchers.words import Failure, in_common
 
 TOLD = ("grade", "outcome", "avoidable", "tester", "situations", *FEATURES)  # columns
@@ -53,6 +52,24 @@ class SearchFacts:
     covered: float
 
 
+@dataclass(frozen=True)
+class SearchOrder:
+    """The search that a batch asks for.
+
+    Attributes:
+        label: of the agent.
+        method: how points are chosen.
+        seed: of the batch.
+        turn, agents: the place of the agent among those that take turns, and how many there are.
+    """
+
+    label: str
+    method: str
+    seed: int
+    turn: int = 0
+    agents: int = 1
+
+
 class Searching:
     """The search of one agent of a batch.
 
@@ -64,15 +81,12 @@ class Searching:
         spaces: the space of each of them: the same, or that of its decisions.
     """
 
-    def __init__(self, prepared: PreparedBatch, label: str, first: Sequence[Point] = ()) -> None:
+    def __init__(self, space: Space, order: SearchOrder, first: Sequence[Point] = ()) -> None:
         """``first``: points of the searcher's space to begin with."""
-        plan = prepared.plan
-        self.label, self._step = label, len(plan.agents)
-        self._first = list(plan.cast).index(label)
-        self.space = prepared.space
-        seed = np.random.SeedSequence([plan.seed, zlib.crc32(label.encode())])
-        method = str(prepared.cast[label].params.get("method", "portfolio"))
-        searcher = searcher_of(method, self.space, np.random.default_rng(seed))
+        self.space, self.label = space, order.label
+        self._first, self._step = order.turn, order.agents
+        seed = np.random.SeedSequence([order.seed, zlib.crc32(order.label.encode())])
+        searcher = searcher_of(order.method, space, np.random.default_rng(seed))
         self.searcher = ContinuedSearch(searcher, first) if first else searcher
         self.points: list[Point] = []
         self.spaces: list[PointSpace] = []

@@ -1,12 +1,15 @@
-"""A search that begins with points of an earlier one."""
+"""A search that begins with points of an earlier one, of the same space."""
 
 from __future__ import annotations
 
+import hashlib
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 from cavsumo.searchers.protocol import GENERATION, PlayedPoint, PointSpace, Searcher
-from cavsumo.searchers.space import Point
+from cavsumo.searchers.space import Point, Space
+
+SPACE = "space of tests"  # its fingerprint in a manifest
 
 
 @dataclass
@@ -39,3 +42,10 @@ class ContinuedSearch:
 
     def tell(self, points: Sequence[Point], told: Sequence[PlayedPoint]) -> None:
         self.searcher.tell(points, told)
+
+
+def fingerprint(space: Space) -> str:
+    """The SHA-256 of what makes points of a space the same tests, but for the ego's behaviour."""
+    places = [(p.whence, p.along, p.lead, p.away) for p in space.movements.places]
+    facts = (space.coordinates, space.teams, space.every, places)
+    return hashlib.sha256(repr(facts).encode()).hexdigest()

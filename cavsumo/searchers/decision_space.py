@@ -8,7 +8,6 @@ another one repeats it up to there.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -17,6 +16,7 @@ from numpy.typing import NDArray
 
 from cavsumo.agents.decisions import Decision, Decisions
 from cavsumo.agents.programme import WalkProgramme
+from cavsumo.agents.searched import Programme
 from cavsumo.searchers.places import Place, within
 from cavsumo.searchers.space import Point, Space
 from cavsumo.searchers.walks import SLOWEST_MPS
@@ -27,6 +27,7 @@ STANDING = 0.2  # a speed below is to stand
 SAME, STAND, ACROSS = 0.4, 0.2, 0.3  # how often a body decides so; else it turns anywhere
 OBLIQUE = (1.0 / 3.0, 2.0 / 3.0)  # of all headings those within 60 degrees of the way across
 STRAIGHT = {"speed": 1.0, "heading": 0.5, "depth": 1.0}
+BY_ITSELF = 0.3  # a further body takes part, not together with the first one
 NOT_KNOWN = math.nan
 
 
@@ -62,13 +63,9 @@ class DecisionSpace:
         """Where a body starts."""
         return self.base.place(self._starts(point), body)
 
-    def played(self, point: Point) -> list[tuple[Place, WalkProgramme]]:
+    def played(self, point: Point) -> list[tuple[Place, Programme | None]]:
         """Places, and the programmes whose first legs the decisions begin with."""
         return [(self.place(point, i), self._likeness(point, i)) for i in range(self.base.bodies)]
-
-    def covered(self, points: Sequence[Point]) -> float:
-        """The share of the places' stretches with a point."""
-        return self.base.covered([self._starts(point) for point in points])
 
     def start(self, rng: np.random.Generator) -> NDArray[np.float64]:
         """A start by chance."""
@@ -104,7 +101,7 @@ class DecisionSpace:
 
     def _starts(self, point: Point) -> Point:
         """A point of the other space whose bodies start there, to go straight across."""
-        found = np.full(self.base.dimension, 0.25)
+        found = np.full(self.base.dimension, BY_ITSELF)
         for i in range(self.base.bodies):
             for name, share in {**STRAIGHT, "place": point[2 * i]}.items():
                 found[self.base.index(i, name)] = share

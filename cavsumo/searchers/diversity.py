@@ -29,7 +29,7 @@ class DiversitySearch:
 
     def __init__(self, space: Space, rng: np.random.Generator, first: Searcher) -> None:
         self.space, self.rng, self.first = space, rng, first
-        stretches = {(p.left, p.along // STRETCH_M) for p in space.movements.places}
+        stretches = {(p.whence, p.along // STRETCH_M) for p in space.movements.places}
         self._stretches = {one: i for i, one in enumerate(sorted(stretches))}
         self._generation = 0
         self._archive = self._empty()
@@ -58,7 +58,7 @@ class DiversitySearch:
         """The cell of a point: impact speed, side and place, manner of the first body."""
         place = self.space.place(point, 0)
         impact = 1 + min(IMPACTS - 1, int(result.grade // IMPACT_MPS)) if result.failed else 0
-        stretch = self._stretches[place.left, place.along // STRETCH_M]
+        stretch = self._stretches[place.whence, place.along // STRETCH_M]
         return impact, stretch, *self.space.manner(point)
 
     def _empty(self) -> Any:

@@ -14,6 +14,7 @@ from cavsumo.searchers.places import Place
 from cavsumo.searchers.space import Point, Space
 
 GENERATION = 10  # points that are chosen together, before any of them is played
+TESTED_GRADE = -2.0  # from here on the ego was tested, and fairly (``results.grade``)
 LOWEST_GRADE = -5.0  # of an invalid episode (``results.grade``); from 0 on are preventable failures
 
 
@@ -45,7 +46,7 @@ class PointSpace(Protocol):
     def place(self, point: Point, body: int) -> Place:
         """Where a body starts."""
 
-    def played(self, point: Point) -> Sequence[tuple[Place, Programme | None]]:
+    def played(self, point: Point) -> list[tuple[Place, Programme | None]]:
         """The place and the programme of every body, None for one that stands by."""
 
 

@@ -169,7 +169,7 @@ def test_a_search_begins_with_what_an_earlier_one_found(
     ("more", "said"),
     [
         (["--testers", "2"], "is of another space: testers was 1, is 2"),
-        (["--net", "crossing"], "is of another network, pedestrians, not crossing"),
+        (["--ego", "sumo"], "or how often the ego decides was another one"),
     ],
 )
 def test_an_earlier_search_of_another_space_is_refused(
@@ -187,6 +187,7 @@ def test_an_earlier_search_of_another_space_is_refused(
     [
         (["--method", "explor"], "unknown method 'explor'; did you mean 'explore'?"),
         (["--param", "search.method=tre"], "unknown method 'tre'; did you mean 'tree'?"),
+        (["--kind", "car", "--method", "tree"], "search.method tree: decides for pedestrian"),
         (["--shard", "1/2"], "shard 1/2: search"),
     ],
 )

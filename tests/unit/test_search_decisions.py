@@ -78,10 +78,9 @@ def test_a_point_that_begins_like_another_one_repeats_it(space: DecisionSpace) -
     second = space.completed(rng, space.rows(first)[:4])
     (one,), (other,) = space.memories(first), space.memories(second)
     assert one["starts"] == other["starts"]
-    (arrival, chosen), (arrival_2, chosen_2) = (
-        memory["programmes"][0].values() for memory in (one, other)
-    )
-    assert arrival == arrival_2
+    (before, after) = one["programmes"][0], other["programmes"][0]
+    assert before["arrival"] == after["arrival"]
+    chosen, chosen_2 = before["chosen"], after["chosen"]
     assert chosen[:3] == chosen_2[:3]
     assert chosen[3:] != chosen_2[3:]
     assert len(chosen) == DECISIONS

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from cavsumo.agents.searched import programme_of
-from cavsumo.errors import NetworkError
+from cavsumo.errors import InputError, NetworkError
 from cavsumo.model.bodies import CAR, PEDESTRIAN
 from cavsumo.model.carriageway import Limit, Start
 from cavsumo.model.geometry import Box, gap
@@ -20,9 +20,11 @@ from cavsumo.model.scenario import BatchPlan
 from cavsumo.network.site import Site
 from cavsumo.searchers.drives import Drives, drive_of
 from cavsumo.searchers.manoeuvres import MANOEUVRES, PAIRS, ManoeuvreSearch
-from cavsumo.searchers.methods import SEARCHERS, searcher_of
+from cavsumo.searchers.methods import SEARCHERS, check_method, searcher_of
+from cavsumo.searchers.neighbours import NeighbourSearch
 from cavsumo.searchers.places import Place
-from cavsumo.searchers.protocol import GENERATION, PlayedPoint
+from cavsumo.searchers.portfolio import Portfolio
+from cavsumo.searchers.protocol import GENERATION, PlayedPoint, RandomSearch
 from cavsumo.searchers.space import FURTHER, TOGETHER, Point, Space, space_of
 from cavsumo.searchers.walks import Walks, walk_of
 from cavsumo.searchers.words import Failure, in_common
@@ -231,6 +233,42 @@ def test_what_was_good_is_looked_at_more_closely(space: Space, method: str) -> N
         searcher.tell(points, told)
         grades += [one.grade for one in told]
     assert np.mean(sorted(grades[-200:])[100:]) > np.mean(sorted(grades[:200])[100:]) + 0.03
+
+
+def test_neighbours_are_those_of_fair_tests(space: Space) -> None:
+    """Of points that nobody met, or unfairly, only while there are no others."""
+    rng = np.random.default_rng(2)
+    points = list(rng.random((10, space.dimension)))
+    searcher = NeighbourSearch(space, rng, RandomSearch(space, rng))
+    for grades in ([-3.2] * 10, [-2.4, -1.5] + [-3.2] * 8):
+        searcher.tell(points, [PlayedPoint(grade, False) for grade in grades])
+        near = [np.argmin([np.linalg.norm(one - p) for p in points]) for one in searcher.ask()]
+        assert (set(near) == {1}) is (max(grades) > -2.0)
+
+
+def test_a_portfolio_goes_on_from_what_was_found(space: Space) -> None:
+    """After failures near the middle most points are there, as neighbours of them."""
+    portfolio, far = Portfolio(space, np.random.default_rng(1)), list[float]()
+    for generation in range(20):
+        points = portfolio.ask()
+        if generation == 0:
+            points = [0.5 + 0.1 * (point - 0.5) for point in points]
+        told = [
+            _sphere(p) if len(p) == space.dimension else PlayedPoint(-3.5, False) for p in points
+        ]
+        portfolio.tell(points, told)
+        far += [-one.grade for one in told]
+    assert np.mean([one < 0.0 for one in far[50:]]) > 0.5
+
+
+def test_a_method_whose_package_is_missing_is_refused(
+    space: Space, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """With the command that brings it."""
+    monkeypatch.setattr("cavsumo.searchers.diversity.find_spec", lambda name: None)
+    check_method("portfolio", space)
+    with pytest.raises(InputError, match=r"needs ribs: pip install 'cavsumo\[search\]'"):
+        check_method("diversity", space)
 
 
 @pytest.mark.parametrize("kind", ["walks", "drives"])
