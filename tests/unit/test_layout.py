@@ -44,6 +44,7 @@ ROOMS = {
 ROOT = {"__init__", "__main__", "errors"}
 
 OPTIONAL = {"IPython", "PIL", "dask", "distributed", "numba", "osmium", "pettingzoo", "pytest"}
+OPTIONAL |= {"scenariogeneration"}
 OPTIONAL |= {"traci"}  # libsumo brings it
 
 
