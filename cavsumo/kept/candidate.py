@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from cavsumo.agents.recorded import Recorded
 from cavsumo.kept.motion import BodyMotion
@@ -12,6 +12,7 @@ from cavsumo.model.bodies import Kind
 from cavsumo.model.carriageway import StartRecord
 from cavsumo.model.departures import Attributes, Demand, Entry, Trip, Walk
 
+TENTH = 10.0  # timesteps in a second, as usual: whole seconds have a digit less
 SPARE_STEPS = 50  # for which motions in legs are told beyond the length of the recorded episode
 
 
@@ -80,7 +81,7 @@ class Candidate:
             x, y, o, v = motion.start[:4]
             yield from (numeral(x), numeral(y), numeral(math.degrees(o)), numeral(v or 0.0))
             for step, speed in motion.legs:
-                yield from (numeral(step / 10.0), numeral(speed))
+                yield from (numeral(step / TENTH), numeral(speed))
         if self.entry is not None:
             yield from (numeral(self.entry.along), numeral(self.entry.speed))
 
@@ -123,15 +124,9 @@ def as_recorded(recorded: Recorded) -> Candidate:
 def of_testers(candidate: Candidate, kept: Sequence[int]) -> Candidate:
     """A candidate with some of its testers, by their places among them."""
 
-    def part(items: tuple, /) -> tuple:  # type: ignore[type-arg]
-        return tuple(items[i] for i in kept) if items else ()
-
-    return Candidate(
-        part(candidate.numbers),
-        part(candidate.motions),
-        part(candidate.waited),
-        candidate.trips,
-        candidate.walks,
-        candidate.entry,
-        candidate.cut,
+    return replace(
+        candidate,
+        numbers=tuple(candidate.numbers[i] for i in kept),
+        motions=tuple(candidate.motions[i] for i in kept),
+        waited=tuple(candidate.waited[i] for i in kept if candidate.waited),
     )

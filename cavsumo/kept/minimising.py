@@ -17,6 +17,7 @@ from cavsumo.batch.jobs import Job
 from cavsumo.batch.playback import AGAIN, NOT_PLAYED_BACK, for_playback, played_back, recording_of
 from cavsumo.batch.prepared import prepare
 from cavsumo.batch.replay import Record, compare, prepared_again
+from cavsumo.batch.replaying import Located
 from cavsumo.batch.worker import Worker
 from cavsumo.errors import DivergenceError, InputError
 from cavsumo.kept.candidate import Candidate, FixedPart, as_recorded
@@ -31,7 +32,7 @@ from cavsumo.results.traces import Trace, trace_of
 MOST_REPLAYS = 1000
 SAME = ("outcome", "assertion", "avoidable")  # columns that every candidate has to keep
 TESTER = "tester"  # ids of testers are this and their numbers
-Located = Callable[[Record], Record]
+
 Notice = Callable[[int, Candidate], None]  # replays so far, and the smallest candidate
 
 
@@ -126,8 +127,7 @@ class Replays:
         self._stack = contextlib.ExitStack()
         self.played = 0
         self._lanes: RouteLanes | None = None
-        self.check_trusted = prepared_again(there)  # refuses names that need trust
-        self.site = self.check_trusted.site
+        self.site = prepared_again(there).site  # refuses names that need trust
         self.first = as_recorded(recorded)
 
     def __enter__(self) -> Replays:

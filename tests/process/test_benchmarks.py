@@ -245,6 +245,19 @@ def test_memory(play: Play) -> None:
     assert said.count("episodes: ") == 3
 
 
+def test_minimise(play: Play) -> None:
+    """A failure at the crossing, by force too, and with planted bodies."""
+    said = play(
+        "minimise", "--failures", "1", "--runs", "20", "--force", "1", "--planted", "1",
+        "--setting", "crossing, pedestrians", PLANTED=5,
+    )  # fmt: skip
+    _, one, everything, force, planted = said.splitlines()
+    assert one.split()[2:7] == ["1", "1", "1", "1", "1"]
+    assert everything.split()[1:] == one.split()[2:]
+    assert re.fullmatch(r"by force: 0 of \d+ single reductions of 1 results fail the same", force)
+    assert planted.startswith("planted: 5 bodies in ")
+
+
 def test_overlaps(play: Play) -> None:
     """An episode on the straight road, with drawn traffic."""
     said = play("overlaps", "--net", NET, "--agent", "timing", "--runs", "1")

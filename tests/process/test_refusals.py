@@ -96,6 +96,8 @@ REFUSED = {
     "minimise old.csv 0 -o a.zip": "'a.zip': expected a name that ends in .cavtest",
     "keep nowhere.cavtest -o a.cavtest": "no such file: 'nowhere.cavtest'",
     "replay nowhere.cavtest": "test 'nowhere.cavtest': cannot be read: No such file",
+    "export old.csv 0 --to openscenario -o nowhere": "--output 'nowhere': no such folder",
+    "export old.csv 0 --to opendrive -o .": "invalid choice: 'opendrive'",
     "regress old.csv --ego sumo": "'old.csv': expected a name that ends in .cavtest",
     "regress nowhere.cavtest --ego sumo": "no such file: 'nowhere.cavtest'",
     "regress nowhere.cavtest --ego constnat": "unknown ego 'constnat'; did you mean 'constant'?",

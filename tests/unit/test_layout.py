@@ -43,17 +43,8 @@ ROOMS = {
 }
 ROOT = {"__init__", "__main__", "errors"}
 
-OPTIONAL = {
-    "IPython",
-    "PIL",
-    "dask",
-    "distributed",
-    "numba",
-    "osmium",
-    "pettingzoo",
-    "pytest",
-    "ribs",
-}
+OPTIONAL = {"IPython", "PIL", "dask", "distributed", "numba", "osmium", "pettingzoo", "pytest"}
+OPTIONAL |= {"ribs", "scenariogeneration"}
 OPTIONAL |= {"traci"}  # libsumo brings it
 
 

@@ -6,7 +6,7 @@ from pathlib import Path
 
 from cavsumo.batch.located import located
 from cavsumo.batch.replay import Record, recorded, recorded_alone
-from cavsumo.batch.replaying import play_back
+from cavsumo.batch.replaying import Located, play_back
 from cavsumo.cli.requests.kept import KeepOptions
 from cavsumo.cli.steps import SlowSteps, say_written
 from cavsumo.errors import Exit
@@ -21,7 +21,7 @@ from cavsumo.results.trace_file import is_trace
 
 def minimise(wanted: KeepOptions) -> int:
     """Make a failure as small as it can be, tell it in a sentence, and write it."""
-    record = _found(wanted)
+    record = found_episode(wanted)
     with SlowSteps(quiet=wanted.quiet) as steps:
         steps.begin(f"making run {record.run} smaller")
 
@@ -44,7 +44,7 @@ def minimise(wanted: KeepOptions) -> int:
 def keep(wanted: KeepOptions) -> int:
     """Play an episode back and write it as one file."""
     assert wanted.output is not None
-    record = _found(wanted)
+    record = found_episode(wanted)
     with SlowSteps() as steps:
         steps.begin(f"playing run {record.run} back")
         located_record = _here(wanted)(record)
@@ -59,7 +59,7 @@ def _progress(replays: int, best: Candidate) -> str:
     return f"{replays} replays, {size_in_words(best)}"
 
 
-def _found(wanted: KeepOptions) -> Record:
+def found_episode(wanted: KeepOptions) -> Record:
     """The episode that is meant."""
     file: Path = wanted.results
     allowed = None if wanted.trust else ()
@@ -71,7 +71,7 @@ def _found(wanted: KeepOptions) -> Record:
     return recorded(file, wanted.run, allowed)
 
 
-def _here(wanted: KeepOptions):  # type: ignore[no-untyped-def]
+def _here(wanted: KeepOptions) -> Located:
     """Gives a record the present paths of its files."""
     if is_cavtest(wanted.results):
         return lambda record: record

@@ -1,4 +1,4 @@
-"""Options of minimise and keep; the heavy parts are imported when they are called."""
+"""Options of minimise, keep and export; the heavy parts are imported when they are called."""
 
 from __future__ import annotations
 
@@ -52,6 +52,24 @@ def add_keep(commands: Any) -> None:
     keep.set_defaults(command=_keep)
 
 
+def add_export(commands: Any) -> None:
+    """The command export."""
+    export = commands.add_parser(
+        "export",
+        help="write a recorded episode in a format of others",
+        description="Write a recorded episode in a format of others. openscenario: test.xosc "
+        "(OpenSCENARIO XML 1.2), in which everybody follows the recorded track, and test.xodr "
+        "(OpenDRIVE) with the roads.",
+        allow_abbrev=False,
+    )
+    _add_episode(export)
+    export.add_argument("--to", required=True, choices=("openscenario",), help="the format")
+    export.add_argument(
+        "-o", "--output", type=Path, required=True, metavar="FOLDER", help="a folder for the files"
+    )
+    export.set_defaults(command=_export)
+
+
 def _add_episode(parser: argparse.ArgumentParser) -> None:
     """The options that name an episode."""
     add = parser.add_argument
@@ -90,3 +108,13 @@ def _keep(options: argparse.Namespace) -> int:
     from cavsumo.cli.commands.kept import keep
 
     return keep(wanted)
+
+
+def _export(options: argparse.Namespace) -> int:
+    from cavsumo.cli.requests.kept import KeepOptions, check_export
+
+    wanted = KeepOptions(**values_of(options, KeepOptions))
+    check_export(wanted)
+    from cavsumo.cli.commands.export import export
+
+    return export(wanted)

@@ -1,8 +1,9 @@
-"""Options of the commands minimise and keep, checked before heavy imports."""
+"""Options of the commands minimise, keep and export, checked before heavy imports."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from importlib.util import find_spec
 from pathlib import Path
 
 from cavsumo.cli.requests.files import check_folder
@@ -41,7 +42,6 @@ class KeepOptions:
 
 def check_kept(command: str, wanted: KeepOptions) -> None:
     """Refuse wrong numbers, names and files."""
-    file, run = wanted.results, wanted.run
     if wanted.replays < 1:
         raise InputError(f"{command}: --replays: expected at least 1, got {wanted.replays}")
     if wanted.html is not None:
@@ -52,6 +52,20 @@ def check_kept(command: str, wanted: KeepOptions) -> None:
                 f"--output {str(wanted.output)!r}: expected a name that ends in {ENDING}"
             )
         check_folder("--output", wanted.output)
+    _check_episode(command, wanted.results, wanted.run)
+
+
+def check_export(wanted: KeepOptions) -> None:
+    """Refuse wrong names and files."""
+    if wanted.output is None or not wanted.output.is_dir():
+        raise InputError(f"--output {str(wanted.output)!r}: no such folder")
+    if find_spec("scenariogeneration") is None:
+        raise InputError("export: needs scenariogeneration: pip install 'cavsumo[export]'")
+    _check_episode("export", wanted.results, wanted.run)
+
+
+def _check_episode(command: str, file: Path, run: int | None) -> None:
+    """Refuse a file that is not there, and a number that is missing or too much."""
     if is_trace(file) or file.suffix == ENDING:
         if run is not None:
             raise InputError(f"{command}: {str(file)!r} is one episode; no run is named")
