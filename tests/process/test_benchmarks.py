@@ -73,6 +73,14 @@ def test_every_benchmark_is_played_here() -> None:
     assert scripts == set(re.findall(r'play\(\s*"(\w+)"', here))
 
 
+def test_rare_events(play: Play) -> None:
+    """Two replications of one process: the truth, and a gain."""
+    _, row = play("rare_events", "--p3", "0.003", "--replications", "2").splitlines()
+    assert numbers(row)[0] == 1.141e-05
+    assert numbers(row)[6] > 1e3
+    assert row.endswith("p3 0.003")
+
+
 def test_reference_tracks(play: Play) -> None:
     """One cell: the largest differences are within the tolerances."""
     test, everything = play("reference_tracks", "--only", "CPFA/60/50").splitlines()[1:]

@@ -30,6 +30,7 @@ ROOMS = {
         "simulation": "model network agents assertions egos sumo",
         "results": "model suites network agents assertions egos sumo simulation",
         "searchers": "model network agents",
+        "probability": "games",
         "batch": "model suites network agents assertions egos sumo simulation results searchers",
         "report": "model suites network assertions egos results batch",
         "interop": "model network sumo results",
