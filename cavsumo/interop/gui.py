@@ -21,7 +21,7 @@ from xml.sax.saxutils import quoteattr
 from cavsumo.errors import InputError
 from cavsumo.model.scenario import Scenario
 from cavsumo.network.drawing.place import COLOURS, DrawnPlace, site_drawn
-from cavsumo.network.osm.extract import EXTRA
+from cavsumo.network.osm.items import EXTRA
 from cavsumo.network.osm.netconvert import sumo_environment, sumo_home
 from cavsumo.network.site import Site
 from cavsumo.results.traces import Shape, Trace, states

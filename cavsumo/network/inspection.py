@@ -13,9 +13,10 @@ from shapely.geometry import LineString
 
 from cavsumo.errors import NetworkError
 from cavsumo.model.carriageway import Roads
-from cavsumo.network.ego_routes import EgoRoute, Movement, movements, ranked_routes, route_through
+from cavsumo.network.ego_routes import EgoRoute, ranked_routes, route_through
 from cavsumo.network.facts import place
 from cavsumo.network.intersections import Pieces, intersections
+from cavsumo.network.movements import Movement, movements
 from cavsumo.network.pedestrian_starts import StartingArea, WaysAcross, starting_areas
 from cavsumo.network.reader import Network, is_normal, lane_shape, street
 

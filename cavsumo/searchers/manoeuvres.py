@@ -19,6 +19,7 @@ STRAIGHT: Range = (0.45, 0.55)
 THROUGH: Range = (0.98, 1.0)
 LATE: Range = (0.15, 0.5)  # as an ego that did not react before could hardly stop
 EARLY: Range = (0.2, 1.0)
+SHORT: Range = (0.1, 0.4)  # as an ego that keeps its speed could not stop any more
 
 # For each manoeuvre the ranges of some numbers of ``space.NAMES``.
 MANOEUVRES: Mapping[str, Mapping[str, Range]] = {
@@ -26,6 +27,11 @@ MANOEUVRES: Mapping[str, Mapping[str, Range]] = {
     "crosses slowly": {"zone": LATE, "speed": (0.0, 0.35), "heading": STRAIGHT, "depth": THROUGH},
     "comes towards": {"zone": LATE, "speed": (0.0, 0.6), "heading": (0.0, 0.35), "depth": THROUGH},
     "walks away": {"zone": LATE, "heading": (0.65, 1.0), "depth": THROUGH},
+    "comes closer, then steps in": {
+        "zone": SHORT, "speed": (0.0, 0.5), "heading": (0.1, 0.6), "depth": (0.05, 0.3),
+        "resume": (0.0, 0.12), "speed_2": (0.7, 1.0), "heading_2": (0.3, 0.5),
+        "length_2": (0.7, 1.0), "heading_3": (0.3, 0.5),
+    },
     "hesitates": {
         "zone": EARLY, "depth": (0.05, 0.4), "resume": (0.1, 0.5), "heading_2": STRAIGHT,
         "heading_3": STRAIGHT,

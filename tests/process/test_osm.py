@@ -18,8 +18,9 @@ from cavsumo.errors import InputError
 from cavsumo.network.facts import facts
 from cavsumo.network.osm import netconvert as program
 from cavsumo.network.osm import xml_stream
-from cavsumo.network.osm.extract import find_roads, parse_box, read_items, write_roads
+from cavsumo.network.osm.extract import find_roads, parse_box, write_roads
 from cavsumo.network.osm.handedness import side, warning
+from cavsumo.network.osm.items import read_items
 from cavsumo.network.reader import read_network
 
 CROSSROADS = DATA / "crossroads.osm"

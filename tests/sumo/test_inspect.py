@@ -18,9 +18,10 @@ from support import ROOT
 from cavsumo.cli import main
 from cavsumo.model.polyline import Path as Polyline
 from cavsumo.network.drawing import layers
-from cavsumo.network.ego_routes import _turns_back, movements, ranked_routes
+from cavsumo.network.ego_routes import _turns_back, ranked_routes
 from cavsumo.network.facts import facts
 from cavsumo.network.inspection import best_junctions, ground, junction
+from cavsumo.network.movements import movements
 from cavsumo.network.reader import read_network
 from cavsumo.network.site import best_route
 

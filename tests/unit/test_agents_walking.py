@@ -17,6 +17,8 @@ from shapely.affinity import rotate
 from shapely.geometry import LineString, Polygon, box
 
 from cavsumo.agents import AGENTS, Agent, Scene
+from cavsumo.agents.programme import WalkProgramme
+from cavsumo.agents.searched import SearchAgent
 from cavsumo.agents.triggers import Timing
 from cavsumo.egos.base import EGO_KIND
 from cavsumo.model.bodies import NOOP, PEDESTRIAN, Body
@@ -321,3 +323,43 @@ def assert_off_the_road(states: Sequence[BodyState]) -> None:
     """No corner of the body is ever on the carriageway."""
     for state in states:
         assert all(abs(y) > -KERB for _, y in corners(state.box)), state
+
+
+# By a programme -----------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("walk", "what"),
+    [
+        ({}, "straight across"),
+        ({"heading": -0.9}, "towards the ego"),
+        ({"speed": 0.5, "heading": 0.6}, "slowly, with the ego"),
+        ({"speed": 0.4, "depth": -0.6}, "comes closer, then steps in"),
+        ({"depth": -0.4, "pause": 1.5}, "stops before the strip"),
+        ({"depth": -0.9, "heading_2": math.pi / 2, "length_2": 2.0}, "along the lane, then in"),
+        ({"speed": 0.6, "depth": -0.5, "resume": 0.5}, "waits for the ego before the strip"),
+    ],
+)
+@pytest.mark.parametrize("zone", [0.0, 0.8])
+def test_a_programme_enters_the_strip_at_its_zone(
+    straight_scene: MakeScene, walk: dict[str, float], what: str, zone: float
+) -> None:
+    """By whichever of its legs, an ego that keeps its speed is then as far away as it says."""
+    scene = straight_scene([(75.0, SOUTH, 0.0)])
+    programme = WalkProgramme(zone, 1.4, 0.0, 3.0, 0.0, None, 1.3, 0.0, 5.0, 0.0)
+    programme = programme._replace(**walk)
+    if programme.resume is not None:
+        programme = programme._replace(zone=1.6, resume=zone)
+    agent = SearchAgent()
+    agent.remember({"starts": [], "programmes": [list(programme)]})
+    start = scene.starts[0]
+    first, ego = (start.x, start.y, 0.0, start.o), (2.25, LANE, SPEED, 0.0)
+    for snapshot in played(scene, agent, first, ego, 94.0 / SPEED):
+        driver, body = snapshot.ego, snapshot.testers[0]
+        inside = [x for x, y in corners(body.box) if abs(y - LANE) < driver.body.kind.width / 2]
+        if inside:
+            gap = min(inside) - driver.x - driver.body.kind.length / 2
+            braking, reaction = 0.5 * SPEED * SPEED / 9.0, 0.675 * SPEED
+            assert gap == pytest.approx(braking + zone * reaction, abs=0.45 * SPEED), what
+            return
+    pytest.fail(f"{what}: never entered the strip")

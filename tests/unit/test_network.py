@@ -16,7 +16,7 @@ from shapely.geometry import LineString, Point
 
 from cavsumo.errors import InputError, NetworkError, UnknownName
 from cavsumo.model.snapshot import Snapshot
-from cavsumo.network.ego_routes import APPROACH_M
+from cavsumo.network.movements import APPROACH_M
 from cavsumo.network.reader import Network, driving_lanes, lane_shape, read_network
 from cavsumo.sumo.world import World
 

@@ -14,8 +14,8 @@ from shapely.geometry import LineString, Point
 from cavsumo.errors import InputError, NetworkError, UnknownName
 from cavsumo.model.bodies import BICYCLE, PEDESTRIAN, Kind
 from cavsumo.model.scenario import BatchPlan
-from cavsumo.network.ego_routes import TURNS
 from cavsumo.network.jaywalk_starts import STRIP_M
+from cavsumo.network.movements import TURNS
 from cavsumo.network.pedestrian_starts import draw_starts
 from cavsumo.network.site import Site
 

@@ -7,7 +7,8 @@ from pathlib import Path
 
 from cavsumo.cli.requests.files import check_folder
 from cavsumo.errors import InputError
-from cavsumo.network.osm.extract import check_extract, parse_box
+from cavsumo.network.osm.extract import parse_box
+from cavsumo.network.osm.items import check_extract
 from cavsumo.network.osm.netconvert import sumo_home
 
 ENDINGS = (".net.xml", ".net.xml.gz")

@@ -18,7 +18,7 @@ from textwrap import shorten
 from xml.sax.saxutils import quoteattr
 
 from cavsumo.errors import InputError, plain
-from cavsumo.network.osm.extract import EXTRA
+from cavsumo.network.osm.items import EXTRA
 
 ODBL = (
     "Contains map data (c) OpenStreetMap contributors, available under the ODbL 1.0 "
