@@ -9,11 +9,12 @@ from pathlib import Path
 from typing import Any
 
 from cavsumo.batch.dispatch import run_batch
+from cavsumo.batch.estimating import EstimateFacts, Estimating
 from cavsumo.batch.learning import Knowledge
 from cavsumo.batch.messages import Answer
 from cavsumo.batch.prepared import OUTPUTS, PreparedBatch
 from cavsumo.batch.progress import Progress
-from cavsumo.batch.searching import SearchFacts
+from cavsumo.batch.searching import SearchFacts, Searching
 from cavsumo.batch.stopping import stopping_rule
 from cavsumo.batch.tally import Tally
 from cavsumo.egos.ego_files import OutputWatch
@@ -92,7 +93,7 @@ class BatchRun:
                 if self._note_outputs() or learned:
                     self.recorder.checkpoint(self._knowledge.facts())
                 progress.update(self.tally)
-                reason = rule(self.tally)
+                reason = rule(self.tally) or self._estimated(int(row["run"]))
                 if reason is not None:
                     break
         missing = self.tally.rows < self.prepared.plan.size
@@ -128,7 +129,20 @@ class BatchRun:
     @property
     def searches(self) -> dict[str, SearchFacts]:
         """The findings of the searching agents."""
-        return {label: search.facts() for label, search in self._knowledge.searches.items()}
+        found = self._knowledge.searches.items()
+        return {label: one.facts() for label, one in found if isinstance(one, Searching)}
+
+    @property
+    def estimates(self) -> dict[str, EstimateFacts]:
+        """The results of the estimating agents."""
+        found = self._knowledge.searches.items()
+        return {label: one.facts() for label, one in found if isinstance(one, Estimating)}
+
+    def _estimated(self, run: int) -> str | None:
+        """Why the batch ends with this episode: all its agents' estimates are over."""
+        found = list(self._knowledge.searches.values())
+        ends = [one.over(run) for one in found if isinstance(one, Estimating)]
+        return ends[0] if len(ends) == len(self.prepared.plan.agents) == 1 and ends[0] else None
 
     def end(self) -> None:
         """Complete the manifest."""

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 import zlib
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -18,7 +18,6 @@ import numpy as np
 from cavsumo.agents.casting import teams
 from cavsumo.batch.jobs import Memory
 from cavsumo.batch.prepared import PreparedBatch
-from cavsumo.errors import ResultsError
 from cavsumo.model.bodies import kind_named
 from cavsumo.results.grade import INVALID_GRADE
 from cavsumo.results.rows import cell
@@ -151,19 +150,3 @@ def space_of_batch(prepared: PreparedBatch) -> Space:
     """The space of the tests of a batch; raises InputError where it holds no start."""
     scenario = prepared.plan.scenario
     return space_of(prepared.site, kind_named(scenario.kind), teams(scenario))
-
-
-def searched(
-    prepared: PreparedBatch, label: str, rows: Iterable[Mapping[str, Any]], run: int
-) -> Memory:
-    """The memories with which the agents of a search played an episode, from the rows before it.
-
-    Raises ResultsError where rows are missing.
-    """
-    search = Searching(prepared, label)
-    for row in rows:
-        if row["agent"] == label and int(row["run"]) < run:
-            search.told(row)
-    if not search.ready(run):
-        raise ResultsError(f"run {run} cannot be found again: rows of the search before it miss")
-    return search.memory(run)

@@ -49,18 +49,6 @@ class Tree:
             active = active[self.feature[node[active]] >= 0]
         return node
 
-    def boxes(self, dimension: int) -> tuple[Floats, Floats]:
-        """Lower and upper corners of all nodes in the unit cube, shape (nodes, dimension)."""
-        low = np.zeros((len(self.feature), dimension))
-        high = np.ones_like(low)
-        for node, feature in enumerate(self.feature):
-            if feature >= 0:
-                for below in (self.left[node], self.right[node]):
-                    low[below], high[below] = low[node], high[node]
-                high[self.left[node], feature] = self.threshold[node]
-                low[self.right[node], feature] = self.threshold[node]
-        return low, high
-
 
 class _Split(NamedTuple):
     """The best split of a node: what it takes from the sum of squares, and where it is."""

@@ -30,8 +30,9 @@ ROOMS = {
         "simulation": "model network agents assertions egos sumo",
         "results": "model suites network agents assertions egos sumo simulation",
         "searchers": "model network agents",
-        "probability": "games",
-        "batch": "model suites network agents assertions egos sumo simulation results searchers",
+        "probability": "model games network agents searchers",
+        "batch": "model suites network agents assertions egos sumo simulation results searchers "
+        "probability",
         "report": "model suites network assertions egos results batch",
         "interop": "model network sumo results",
         "api": "model suites network agents batch report results",
