@@ -84,7 +84,7 @@ class BatchRun:
         """Play the remaining episodes, until the end or a reason to stop."""
         self.status = "broken"
         rule = stopping_rule(self.prepared.plan)
-        reason = rule(self.tally)
+        reason = rule(self.tally) or self._estimated()
         with Progress(self.prepared.plan.size, self.quiet, self.tally.rows) as progress:
             for answer in self._answers(self._todo, progress) if reason is None else ():
                 row = self.recorder.write(answer.outcome)
@@ -138,11 +138,11 @@ class BatchRun:
         found = self._knowledge.searches.items()
         return {label: one.facts() for label, one in found if isinstance(one, Estimating)}
 
-    def _estimated(self, run: int) -> str | None:
-        """Why the batch ends with this episode: all its agents' estimates are over."""
-        found = list(self._knowledge.searches.values())
+    def _estimated(self, run: int | None = None) -> str | None:
+        """Why the batch ends with this episode, or with those recorded: its estimate is over."""
+        found = self._knowledge.searches.values()
         ends = [one.over(run) for one in found if isinstance(one, Estimating)]
-        return ends[0] if len(ends) == len(self.prepared.plan.agents) == 1 and ends[0] else None
+        return next(filter(None, ends), None)
 
     def end(self) -> None:
         """Complete the manifest."""

@@ -29,6 +29,8 @@ from cavsumo.probability.weights import Estimate
 from cavsumo.results.grade import INVALID_GRADE
 from cavsumo.results.rows import cell
 
+BEYOND = 10  # vectors that are drawn together after the end of an estimate
+
 
 @dataclass(frozen=True)
 class EstimateFacts:
@@ -84,8 +86,9 @@ class Estimating:
         self._method = agent.method
         goal = Goal(plan.runs, agent.half_width, agent.bound or None)
         seed = np.random.SeedSequence([plan.seed, zlib.crc32(EXPOSURE.encode())])
-        make, rng = ESTIMATORS[agent.method], np.random.default_rng(seed)
-        self._estimator = make(self.encounters.dimension, goal, rng)
+        self._rng = np.random.default_rng(seed)
+        make = ESTIMATORS[agent.method]
+        self._estimator = make(self.encounters.dimension, goal, self._rng)
         self.vectors: list[Floats] = []
         self._generation = range(0)  # episodes of the vectors that were asked for last
         self._told: dict[int, PlayedVector] = {}
@@ -109,16 +112,20 @@ class Estimating:
         if not self.ready(int(row["run"])):
             return
         number = self._number(int(row["run"]))
-        self._told[number] = _played(row)
+        self._told[number] = played_vector(row)
         self._lasted[number] = float(cell(row["time_s"]) or 0.0)
         if row["outcome"] == "error":
             self._errors.add(number)
         if len(self._told) == len(self.vectors):
             self._go_on()
 
-    def over(self, run: int) -> str:
-        """Why the estimate ends with this episode; empty where it goes on."""
-        ends = self._number(run) == len(self.vectors) - 1 == len(self._told) - 1
+    def over(self, run: int | None = None) -> str:
+        """Why the estimate ends with this episode (None: with those told); empty if it goes on.
+
+        Beside other agents it goes on with vectors by chance, so that all play equally often.
+        """
+        last = run is None or self._number(run) == len(self.vectors) - 1
+        ends = self._step == 1 and last and len(self._told) == len(self.vectors)
         return self._estimator.over if ends else ""
 
     def facts(self) -> EstimateFacts:
@@ -140,17 +147,21 @@ class Estimating:
 
     def _go_on(self) -> bool:
         """Tell the estimator of its last generation and ask for the next, if that is possible."""
-        if self._estimator.over or not all(n in self._told for n in self._generation):
+        if not all(n in self._told for n in self._generation):
             return False
-        if self._generation:
+        if self._generation and not self._estimator.over:
             self._estimator.tell([self._told[n] for n in self._generation])
             self._generation = range(0)
-        if self._estimator.over:
+        if self._estimator.over and self._step == 1:
             return False
-        asked = self._estimator.ask()
+        asked = self._beyond() if self._estimator.over else self._estimator.ask()
         self._generation = range(len(self.vectors), len(self.vectors) + len(asked))
         self.vectors += list(asked)
         return True
+
+    def _beyond(self) -> Floats:
+        """Vectors by chance after the end of the estimate."""
+        return self._rng.random((BEYOND, self.encounters.dimension))
 
 
 def encounters_of_batch(prepared: PreparedBatch, label: str) -> Encounters:
@@ -160,7 +171,7 @@ def encounters_of_batch(prepared: PreparedBatch, label: str) -> Encounters:
     return encounters_of(prepared.site, kind, teams(scenario), exposure)
 
 
-def _played(row: Mapping[str, Any]) -> PlayedVector:
+def played_vector(row: Mapping[str, Any]) -> PlayedVector:
     """The result of a vector; a row of this session and one that was recorded tell the same."""
     text = {key: cell(row[key]) for key in ("grade", "outcome", "avoidable")}
     grade = float(text["grade"]) if text["grade"] else INVALID_GRADE

@@ -14,7 +14,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from cavsumo.probability.kernels import Kernels, learned, uniform
-from cavsumo.probability.protocol import Goal, PlayedVector, looks
+from cavsumo.probability.protocol import ALL_PLAYED, Goal, PlayedVector, looks
 from cavsumo.probability.tree import Floats
 from cavsumo.probability.weights import Estimate, contradicts, gain_of, weighted
 
@@ -132,7 +132,7 @@ class WeightedEstimation:
             found = replace(found, refused="the estimate contradicts its last pilot")
         self.over = self._goal.reached(found)
         if not self.over and not self._looks:
-            self.over = f"{found.episodes} episodes are played"
+            self.over = ALL_PLAYED
         return found
 
     def gain(self) -> tuple[float, float, float]:

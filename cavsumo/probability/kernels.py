@@ -19,7 +19,7 @@ from cavsumo.probability.tree import Floats
 
 DEFENSIVE = 0.2
 FEWEST, MOST = 40, 200  # centres: all failures, or the best
-WIDENED = 1.4
+WIDENED = 2.0
 NARROWEST = 1e-3
 CHUNK = 2000  # vectors whose density is computed together
 

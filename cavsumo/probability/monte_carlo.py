@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from cavsumo.probability.protocol import Goal, PlayedVector, looks
+from cavsumo.probability.protocol import ALL_PLAYED, Goal, PlayedVector, looks
 from cavsumo.probability.tree import Floats
 from cavsumo.probability.weights import Estimate
 
@@ -38,7 +38,7 @@ class MonteCarlo:
         self.history.append(exact_estimate(self.failures, self.played, look.error, self.goal.level))
         self.over = self.goal.reached(self.history[-1])
         if not self.over and not self._looks:
-            self.over = f"{self.played} episodes are played"
+            self.over = ALL_PLAYED
 
     def gain(self) -> tuple[float, float, float]:
         return 1.0, 1.0, 1.0

@@ -16,6 +16,7 @@ from typing import NamedTuple, Protocol
 from cavsumo.probability.tree import Floats
 from cavsumo.probability.weights import Estimate
 
+ALL_PLAYED = "all episodes are played"
 FIRST_LOOK = 50  # episodes before which nothing is decided
 
 
@@ -65,7 +66,6 @@ class Estimator(Protocol):
     Attributes:
         over: why no more vectors are wanted; empty while some are.
         history: the estimate at each look so far.
-        used: how many of the vectors the last of them rests on, the others being pilots.
     """
 
     over: str

@@ -33,7 +33,7 @@ ROOMS = {
         "probability": "model games network agents searchers",
         "batch": "model suites network agents assertions egos sumo simulation results searchers "
         "probability",
-        "report": "model suites network assertions egos results batch",
+        "report": "model suites network assertions egos results probability batch",
         "interop": "model network sumo results",
         "api": "model suites network agents batch report results",
         "envs": "model network agents assertions egos simulation results batch",
