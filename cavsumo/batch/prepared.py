@@ -35,6 +35,7 @@ from cavsumo.network.traffic import Volume
 from cavsumo.network.traffic_lights import Pace
 from cavsumo.probability.encounters import encounters_of
 from cavsumo.probability.exposure import exposure_of
+from cavsumo.probability.methods import check_episodes
 from cavsumo.results.present import input_files
 from cavsumo.results.provenance import checksums, traffic_checksum, unequal, versions
 from cavsumo.searchers.space import space_of
@@ -255,6 +256,7 @@ def _check_exposures(site: Site, kind: Kind, plan: BatchPlan, cast: Cast) -> Non
     for member in cast:
         if member.name == EXPOSURE:
             exposure = exposure_of(member.params)
+            check_episodes(str(member.params.get("method")), plan.runs)
             encounters_of(site, kind, teams(plan.scenario), exposure)
 
 

@@ -1,6 +1,6 @@
 """The automatic choice: Monte Carlo, unless pilots show that failures are rare and can be aimed at.
 
-Failures that are frequent among the first vectors need no other estimator. Otherwise pilots learn,
+Few episodes and frequent failures among the first need no other estimator. Otherwise pilots learn,
 and if the last of them drew several failures, importance sampling goes on; where it is still
 refused after half of the episodes, Monte Carlo takes over. The estimate never rests on the vectors
 by which it was chosen.
@@ -15,7 +15,7 @@ import numpy as np
 
 from cavsumo.probability.importance import PILOTS, Pilots, WeightedEstimation
 from cavsumo.probability.monte_carlo import MonteCarlo
-from cavsumo.probability.protocol import Goal, PlayedVector
+from cavsumo.probability.protocol import FEWEST_EPISODES, Goal, PlayedVector
 from cavsumo.probability.tree import Floats
 from cavsumo.probability.weights import Estimate
 
@@ -35,11 +35,13 @@ class Automatic:
     history: list[Estimate] = field(default_factory=list)
 
     def __post_init__(self) -> None:
-        self._each = max(10, int(PILOT_SHARE * self.goal.episodes))
+        self._each = int(PILOT_SHARE * self.goal.episodes)
         self._pilots = Pilots(self.dimension, self.rng)
         self._generations, self._spent = 0, 0
         self._weighted: WeightedEstimation | None = None
         self._plain: MonteCarlo | None = None
+        if self.goal.episodes < FEWEST_EPISODES:
+            self._go_plain(0)
 
     def ask(self) -> Floats:
         if self._plain is not None:

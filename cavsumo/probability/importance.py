@@ -77,7 +77,7 @@ class ImportanceSampling:
     history: list[Estimate] = field(default_factory=list)
 
     def __post_init__(self) -> None:
-        self._each = max(10, int(PILOT_SHARE * self.goal.episodes))
+        self._each = int(PILOT_SHARE * self.goal.episodes)
         self._left = PILOTS
         self._pilots = Pilots(self.dimension, self.rng)
         self._final: WeightedEstimation | None = None

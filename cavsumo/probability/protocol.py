@@ -17,6 +17,7 @@ from cavsumo.probability.tree import Floats
 from cavsumo.probability.weights import Estimate
 
 ALL_PLAYED = "all episodes are played"
+FEWEST_EPISODES = 100  # with fewer nothing is learned from pilots
 FIRST_LOOK = 50  # episodes before which nothing is decided
 
 

@@ -81,6 +81,17 @@ def test_rare_events(play: Play) -> None:
     assert row.endswith("p3 0.003")
 
 
+def test_estimates(play: Play) -> None:
+    """A truth, and two estimates of few episodes by each method."""
+    words = "--net", "pedestrians", "--ego", "constant", "--truth", "20"
+    words += "--replications", "2", "--episodes", "20"
+    words += "--method", "auto", "--method", "monte-carlo"
+    truth, _, *methods = play("estimates", *words).splitlines()
+    assert truth.startswith("truth: ")
+    assert " in 20 episodes of " in truth
+    assert [row.split()[0] for row in methods] == ["auto", "monte-carlo"]
+
+
 def test_reference_tracks(play: Play) -> None:
     """One cell: the largest differences are within the tolerances."""
     test, everything = play("reference_tracks", "--only", "CPFA/60/50").splitlines()[1:]

@@ -16,7 +16,7 @@ from cavsumo.errors import Exit
 from cavsumo.report.estimates import as_json
 
 Capture = pytest.CaptureFixture[str]
-MOST = 60
+MOST = 100  # from which pilots learn
 OFTEN = "[attention]\ninattentive = 1.0\n[arrivals]\nwithin_s = 6.0\n"
 
 
@@ -138,6 +138,7 @@ def test_beside_other_agents_all_play_equally_often(tmp_path: Path) -> None:
         (["--against", "sumo", "--method", "importance"], "--against: needs --method monte-carlo"),
         (["--kind", "car"], "agent exposure can only walk"),
         (["--max-episodes", "0"], "runs"),
+        (["--method", "importance", "--max-episodes", "60"], "at least 100 episodes, got 60"),
     ],
 )
 def test_an_estimate_that_is_impossible_is_refused(
