@@ -81,6 +81,18 @@ def test_rare_events(play: Play) -> None:
     assert row.endswith("p3 0.003")
 
 
+def test_estimators(play: Play) -> None:
+    """Two replications of each method on each function; probabilities are known."""
+    _, *found = play("estimators", "--replications", "2", "--episodes", "200").splitlines()
+    assert [row.split()[2] for row in found[:5]] == [
+        "auto", "monte-carlo", "importance", "sobol", "subset",
+    ]  # fmt: skip
+    assert {row.split()[0]: row.split()[1] for row in found} == {
+        "corner": "1.0e-04", "corners": "1.0e-03", "ball": "1.2e-04", "scattered": "1.0e-03",
+        "pedestrian": found[-1].split()[1],
+    }  # fmt: skip
+
+
 def test_estimates(play: Play) -> None:
     """A truth, and two estimates of few episodes by each method."""
     words = "--net", "pedestrians", "--ego", "constant", "--truth", "20"
