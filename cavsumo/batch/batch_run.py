@@ -9,11 +9,12 @@ from pathlib import Path
 from typing import Any
 
 from cavsumo.batch.dispatch import run_batch
+from cavsumo.batch.estimating import EstimateFacts, Estimating
 from cavsumo.batch.learning import Knowledge
 from cavsumo.batch.messages import Answer
 from cavsumo.batch.prepared import OUTPUTS, PreparedBatch
 from cavsumo.batch.progress import Progress
-from cavsumo.batch.searching import SearchFacts
+from cavsumo.batch.searching import SearchFacts, Searching
 from cavsumo.batch.stopping import stopping_rule
 from cavsumo.batch.tally import Tally
 from cavsumo.egos.ego_files import OutputWatch
@@ -99,7 +100,7 @@ class BatchRun:
         """Play the remaining episodes, until the end or a reason to stop."""
         self.status = "broken"
         rule = stopping_rule(self.prepared.plan)
-        reason = rule(self.tally)
+        reason = rule(self.tally) or self._estimated()
         with Progress(self.prepared.plan.size, self.quiet, self.tally.rows) as progress:
             for answer in self._answers(self._todo, progress) if reason is None else ():
                 row = self.recorder.write(answer.outcome)
@@ -108,7 +109,7 @@ class BatchRun:
                 if self._note_outputs() or learned:
                     self.recorder.checkpoint(self._knowledge.facts())
                 progress.update(self.tally)
-                reason = rule(self.tally)
+                reason = rule(self.tally) or self._estimated(int(row["run"]))
                 if reason is not None:
                     break
         missing = self.tally.rows < self.prepared.plan.size
@@ -144,7 +145,20 @@ class BatchRun:
     @property
     def searches(self) -> dict[str, SearchFacts]:
         """The findings of the searching agents."""
-        return {label: search.facts() for label, search in self._knowledge.searches.items()}
+        found = self._knowledge.searches.items()
+        return {label: one.facts() for label, one in found if isinstance(one, Searching)}
+
+    @property
+    def estimates(self) -> dict[str, EstimateFacts]:
+        """The results of the estimating agents."""
+        found = self._knowledge.searches.items()
+        return {label: one.facts() for label, one in found if isinstance(one, Estimating)}
+
+    def _estimated(self, run: int | None = None) -> str | None:
+        """Why the batch ends with this episode, or with those recorded: its estimate is over."""
+        found = self._knowledge.searches.values()
+        ends = [one.over(run) for one in found if isinstance(one, Estimating)]
+        return next(filter(None, ends), None)
 
     def end(self) -> None:
         """Complete the manifest."""

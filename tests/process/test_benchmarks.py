@@ -83,6 +83,37 @@ def test_early_end(play: Play) -> None:
     assert shorter < whole
 
 
+def test_rare_events(play: Play) -> None:
+    """Two replications of one process: the truth, and a gain."""
+    _, row = play("rare_events", "--p3", "0.003", "--replications", "2").splitlines()
+    assert numbers(row)[0] == 1.141e-05
+    assert numbers(row)[6] > 1e3
+    assert row.endswith("p3 0.003")
+
+
+def test_estimators(play: Play) -> None:
+    """Two replications of each method on each function; probabilities are known."""
+    _, *found = play("estimators", "--replications", "2", "--episodes", "200").splitlines()
+    assert [row.split()[2] for row in found[:5]] == [
+        "auto", "monte-carlo", "importance", "sobol", "subset",
+    ]  # fmt: skip
+    assert {row.split()[0]: row.split()[1] for row in found} == {
+        "corner": "1.0e-04", "corners": "1.0e-03", "ball": "1.2e-04", "scattered": "1.0e-03",
+        "pedestrian": found[-1].split()[1],
+    }  # fmt: skip
+
+
+def test_estimates(play: Play) -> None:
+    """A truth, and two estimates of few episodes by each method."""
+    words = "--net", "pedestrians", "--ego", "constant", "--truth", "20"
+    words += "--replications", "2", "--episodes", "20"
+    words += "--method", "auto", "--method", "monte-carlo"
+    truth, _, *methods = play("estimates", *words).splitlines()
+    assert truth.startswith("truth: ")
+    assert " in 20 episodes of " in truth
+    assert [row.split()[0] for row in methods] == ["auto", "monte-carlo"]
+
+
 def test_reference_tracks(play: Play) -> None:
     """One cell: the largest differences are within the tolerances."""
     test, everything = play("reference_tracks", "--only", "CPFA/60/50").splitlines()[1:]

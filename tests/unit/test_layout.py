@@ -30,9 +30,11 @@ ROOMS = {
         "simulation": "model network agents assertions egos sumo",
         "results": "model suites network agents assertions egos sumo simulation",
         "searchers": "model network agents",
-        "batch": "model suites network agents assertions egos sumo simulation results searchers",
+        "probability": "model games network agents searchers",
+        "batch": "model suites network agents assertions egos sumo simulation results searchers "
+        "probability",
         "kept": "model network agents assertions results batch",
-        "report": "model suites network assertions egos results batch kept",
+        "report": "model suites network assertions egos results probability batch kept",
         "interop": "model network sumo results",
         "api": "model suites network agents batch kept report results",
         "envs": "model network agents assertions egos simulation results batch",
