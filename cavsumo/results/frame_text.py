@@ -25,6 +25,7 @@ from cavsumo.model.snapshot import Snapshot
 
 Numbers = Sequence[float]
 NEXT, BETWEEN = "], ", "], ["  # behind a group of numbers, and up to the next
+AT_ONCE = 1000  # groups whose text is made at once; more memory would have to be fetched each time
 UNLIKE = ("e", "0.0000")  # in numbers that Python may write in another way
 _JSON = TypeAdapter[Any](Any, config=ConfigDict(ser_json_inf_nan="constants"))
 
@@ -88,7 +89,9 @@ class _Text:
 
     def joined(self) -> str:
         """The whole text."""
-        pairs = zip(self._pieces, _written(self._numbers), strict=True)
+        numbers = self._numbers
+        parts = (numbers[i : i + AT_ONCE] for i in range(0, len(numbers), AT_ONCE))
+        pairs = zip(self._pieces, chain.from_iterable(map(_written, parts)), strict=True)
         return "".join(chain.from_iterable(pairs)) + self.end
 
 
