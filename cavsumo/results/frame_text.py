@@ -38,7 +38,7 @@ def frames_text(frames: Iterable[Snapshot], actions: Iterable[Sequence[Action]] 
     Args:
         actions: what the testers' bodies did in each timestep; none at the end.
     """
-    text, joints, key = _Text(), iter(actions), cache(_key)
+    text, joints, key, quoted = _Text(), iter(actions), cache(_key), cache(json.dumps)
     for snapshot in frames:
         text.add(f'{{"step": {snapshot.step}, "time_s": ', (snapshot.time,))
         text.add(', "ego": [', snapshot.ego[1:])
@@ -49,7 +49,7 @@ def frames_text(frames: Iterable[Snapshot], actions: Iterable[Sequence[Action]] 
         ):
             poses = {key(state[0].id): state[1:] for state in states}  # of one id the last
             text.add_groups(f', "{name}": {{', poses, poses.values(), "}")
-        text.end += f', "lights": {json.dumps("".join(snapshot.lights))}'
+        text.end += f', "lights": {quoted("".join(snapshot.lights))}'
         joint = next(joints, ())
         text.add_groups(', "actions": [', [f"{NEXT}["] * len(joint), joint, "]")
         text.end += "}\n"
