@@ -25,6 +25,7 @@ from cavsumo.model.snapshot import Snapshot
 
 Numbers = Sequence[float]
 NEXT, BETWEEN = "], ", "], ["  # behind a group of numbers, and up to the next
+AT_ONCE = 1000  # groups whose text is made at once; more memory would have to be fetched each time
 UNLIKE = ("e", "0.0000")  # in numbers that Python may write in another way
 _JSON = TypeAdapter[Any](Any, config=ConfigDict(ser_json_inf_nan="constants"))
 
@@ -37,7 +38,7 @@ def frames_text(frames: Iterable[Snapshot], actions: Iterable[Sequence[Action]] 
     Args:
         actions: what the testers' bodies did in each timestep; none at the end.
     """
-    text, joints, key = _Text(), iter(actions), cache(_key)
+    text, joints, key, quoted = _Text(), iter(actions), cache(_key), cache(json.dumps)
     for snapshot in frames:
         text.add(f'{{"step": {snapshot.step}, "time_s": ', (snapshot.time,))
         text.add(', "ego": [', snapshot.ego[1:])
@@ -48,7 +49,7 @@ def frames_text(frames: Iterable[Snapshot], actions: Iterable[Sequence[Action]] 
         ):
             poses = {key(state[0].id): state[1:] for state in states}  # of one id the last
             text.add_groups(f', "{name}": {{', poses, poses.values(), "}")
-        text.end += f', "lights": {json.dumps("".join(snapshot.lights))}'
+        text.end += f', "lights": {quoted("".join(snapshot.lights))}'
         joint = next(joints, ())
         text.add_groups(', "actions": [', [f"{NEXT}["] * len(joint), joint, "]")
         text.end += "}\n"
@@ -88,7 +89,9 @@ class _Text:
 
     def joined(self) -> str:
         """The whole text."""
-        pairs = zip(self._pieces, _written(self._numbers), strict=True)
+        numbers = self._numbers
+        parts = (numbers[i : i + AT_ONCE] for i in range(0, len(numbers), AT_ONCE))
+        pairs = zip(self._pieces, chain.from_iterable(map(_written, parts)), strict=True)
         return "".join(chain.from_iterable(pairs)) + self.end
 
 
