@@ -170,6 +170,18 @@ def test_vehicles_start_on_approaches_apart_from_each_other(drives: Space) -> No
         assert min(gap(box, Box(*ego, CAR.length, CAR.width)) for box in boxes) > 3.0
 
 
+def test_a_slow_vehicle_starts_where_it_is_in_time(drives: Space) -> None:
+    """One that creeps and stops before it goes on needs more time from its line."""
+    numbers = dict.fromkeys(Drives.meanings, 0.5)
+    quick = numbers | {"depth": 1.0, "speed": 1.0, "zone": 0.3}
+    slow = numbers | {"depth": 0.2, "resume": 0.4, "speed": 0.3, "zone": 0.3}
+    soon, late = (set(drives.movements.suited(one)) for one in (quick, slow))
+    assert late < soon <= set(drives.movements.places)
+    ahead = {p for p in drives.movements.places if p.whence == "ahead of the ego"}
+    assert ahead <= late  # they need no line
+    assert {p.whence for p in late - ahead}
+
+
 def test_the_side_of_a_vehicle_is_seen_from_the_ego(drives: Space) -> None:
     """Far from the ego's path it lies on that side."""
     for place in drives.movements.places:
