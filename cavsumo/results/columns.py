@@ -17,9 +17,9 @@ from cavsumo.results.grade import grade
 if TYPE_CHECKING:
     from cavsumo.agents.base import Forecast
     from cavsumo.simulation.avoidability import Avoidability
+    from cavsumo.simulation.courses import BodyCourse
     from cavsumo.simulation.ego_progress import EgoProgress
     from cavsumo.simulation.episode import Episode
-    from cavsumo.simulation.tester_course import TesterCourse
 
 Row = dict[str, Any]
 
@@ -105,7 +105,7 @@ def _driven(value: Callable[[EgoProgress], Any]) -> Measured:
     return Measured(lambda episode: value(episode.progress))
 
 
-def _coming(value: Callable[[TesterCourse], Any]) -> Measured:
+def _coming(value: Callable[[BodyCourse], Any]) -> Measured:
     """A value of the course of the tester that was met."""
     return Measured(lambda e: None if e.course is None else value(e.course))
 

@@ -18,8 +18,8 @@ from cavsumo.model.bodies import Action
 from cavsumo.model.carriageway import Start
 from cavsumo.model.departures import Demand
 from cavsumo.model.snapshot import Snapshot
+from cavsumo.simulation.courses import BodyCourse
 from cavsumo.simulation.ego_progress import EgoProgress
-from cavsumo.simulation.tester_course import TesterCourse
 
 # The actions of all agents at one timestep: for each agent those of its bodies.
 Joint = Sequence[Sequence[Action]]
@@ -67,7 +67,7 @@ class Episode:
     forecast: Forecast | None = None
     short: float | None = None
     notes: str = ""
-    course: TesterCourse | None = None
+    course: BodyCourse | None = None
 
     @property
     def outcome(self) -> str:

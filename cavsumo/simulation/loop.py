@@ -19,6 +19,7 @@ from cavsumo.model.bodies import Action
 from cavsumo.model.departures import Demand
 from cavsumo.model.left_behind import LeftBehind
 from cavsumo.model.snapshot import Snapshot
+from cavsumo.simulation.courses import course_of
 from cavsumo.simulation.ego_progress import ego_progress
 from cavsumo.simulation.ending import all_behind, at_end, over
 from cavsumo.simulation.episode import Episode, Joint
@@ -27,7 +28,6 @@ from cavsumo.simulation.moving import moved
 from cavsumo.simulation.rewards import Feedback, RewardMonitor
 from cavsumo.simulation.setup import Setup
 from cavsumo.simulation.starting import cast, generators_of, started
-from cavsumo.simulation.tester_course import tester_course
 
 
 class EpisodeLoop:
@@ -186,7 +186,7 @@ class EpisodeLoop:
         arrived = True if self._arrived else False if late else None
         episode.progress = ego_progress(self.scene, self.history, arrived, cut=self._cut)
         episode.invalid, episode.breach = spoilt is not None, spoilt or self._validity.first
-        episode.course = tester_course(self.scene, self.history, episode.judgement.tester)
+        episode.course = course_of(self.scene, self.history, episode.judgement.tester)
         if episode.outcome == VIOLATED:
             episode.blame = blamed(self.scene, self.history, episode.judgement)
         elif self.measured and episode.outcome in (HELD, UNFAIR):

@@ -15,7 +15,7 @@ LEFT, RIGHT, AHEAD = "left", "right", "ahead"
 BESIDE_M = 1.5  # a vehicle that starts nearer to the ego's path starts ahead
 
 
-class TesterCourse(NamedTuple):
+class BodyCourse(NamedTuple):
     """The course of one tester.
 
     Attributes:
@@ -29,22 +29,23 @@ class TesterCourse(NamedTuple):
     speed: float | None
 
 
-def tester_course(scene: Scene, history: Sequence[Snapshot], name: str) -> TesterCourse | None:
+def course_of(scene: Scene, history: Sequence[Snapshot], name: str) -> BodyCourse | None:
     """The course of the tester of a name, else of that which came nearest; None without testers."""
     index = next((i for i, body in enumerate(scene.bodies) if body.id == name), None)
     if index is None:
         index = _nearest(history)
     if index is None:
         return None
-    start, way, met = scene.starts[index], scene.way(index), meeting(scene, index)
-    states = [snapshot.testers[index] for snapshot in history]
+    start, states = scene.starts[index], [snapshot.testers[index] for snapshot in history]
+    drives = start.approach is not None
+    way, met = (None, None) if drives else (scene.way(index), meeting(scene, index))
     if way is None or met is None:
         here = scene.ego_path.project(start.x, start.y)
         side = AHEAD if abs(here.lateral) < BESIDE_M else LEFT if here.lateral > 0.0 else RIGHT
-        return TesterCourse(here.along, side, _mean([s.v for s in states]))
+        return BodyCourse(here.along, side, _mean([s.v for s in states]))
     left = math.sin(scene.ego_path.at(met.along)[2] - way.heading) > 0.0
     on_road = [s.v for s in states if way.enter < way.progress(s.x, s.y) < way.leave]
-    return TesterCourse(met.along, LEFT if left else RIGHT, _mean(on_road))
+    return BodyCourse(met.along, LEFT if left else RIGHT, _mean(on_road))
 
 
 def _nearest(history: Sequence[Snapshot]) -> int | None:
