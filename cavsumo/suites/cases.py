@@ -65,8 +65,8 @@ class SuiteCases:
             names = self._names(cell, layer)
             script = _script(suite, cell, names, layer)
             end = _number(cell.test.end, names)
-        except UnknownName:
-            raise
+        except UnknownName as error:
+            raise InputError(f"{place}: {error}") from error
         except ValidationError as error:
             raise InputError(f"{place}: {first_problem(error)}") from error
         except ValueError as error:

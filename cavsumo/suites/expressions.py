@@ -99,6 +99,11 @@ def _value(node: ast.AST, names: Mapping[str, Value], text: str) -> Any:
         arguments = [_value(argument, names, text) for argument in node.args]
         try:
             return FUNCTIONS[node.func.id](*arguments)
+        except TypeError as error:
+            count = len(arguments)
+            raise ValueError(
+                f"{text!r}: {node.func.id} does not take these {count} values"
+            ) from error
         except ValueError as error:
             raise ValueError(f"{text!r} has no value: {error}") from error
     raise ValueError(f"{text!r}: expected numbers, names, + - * / **, brackets and functions")

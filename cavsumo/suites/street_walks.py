@@ -120,7 +120,7 @@ def chance_points(tester: str, pedestrians: float, draw: float, index: float) ->
 def walks(street: WalkedStreet, tester: str, pedestrians: int, draw: int) -> list[Points]:
     """The walks of all pedestrians; the same number of a draw begins alike for every tester."""
     if tester not in TESTERS:
-        raise UnknownName("tester", tester, TESTERS)
+        raise UnknownName("tester", str(tester), TESTERS)
     rng = Random(f"{pedestrians} {draw}")
     walkers = [_begun(street, rng) for _ in range(pedestrians)]
     for k in range(round(street.seconds / EVERY_S) + 1):

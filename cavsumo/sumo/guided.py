@@ -53,7 +53,11 @@ class GuidedEgo:
 
     def held(self) -> bool:
         """Whether it still keeps the speed of the test instead of obeying its controller."""
-        self._held = self._held and self._front() < self._script.begins_m
+        # One timestep at least: SUMO's driver keeps its acceleration until it decides again, which
+        # is that of the jump to the speed of the test before.
+        front, approach = self._front(), self._script.ego
+        entered = front <= approach.start_m + 1e-6
+        self._held = self._held and (entered or front < self._script.begins_m)
         return self._held
 
     def release(self) -> None:

@@ -128,6 +128,13 @@ def test_the_crosswalk_is_played_as_its_model_computes_it(tmp_path: Path) -> Non
         assert state[1:3] == pytest.approx((x, y - 1.75), abs=1e-3)
 
 
+def test_a_driver_that_decides_once_a_second_keeps_the_speed_with_which_it_entered() -> None:
+    """Also where the test begins at once, less than four seconds before the disturbance."""
+    how: dict[str, Any] = {"only": "cut-in/30/20/21/1.6", "trace": "none", "progress": False}
+    (row,) = cavsumo.suite("un-r157", "sumo", **how).rows.to_dict("records")
+    assert row["outcome"] == "held", row["error"]
+
+
 def test_the_target_commits_once(tmp_path: Path) -> None:
     """It walks on as it began, although the ego brakes."""
     how: dict[str, Any] = {"only": "CPFA/30/50", "trace": "all", "progress": False}
