@@ -17,7 +17,9 @@ from cavsumo.model.carriageway import StartRecord
 from cavsumo.model.departures import Entry, Trip
 from cavsumo.model.scenario import BatchPlan, Scenario
 
+EARLY, LATE = "tester0 left the world at 2.0 s", "tester0 left the world at 22.6 s"
 ROW = {
+    "time_s": "2.700",
     "outcome": "violated", "assertion": "reaction-zone", "tester": "tester0", "avoidable": "1",
     "reference": "human", "violation_time_s": "2.700", "impact_speed_mps": "2.500",
 }  # fmt: skip
@@ -64,7 +66,12 @@ def test_several_testers_and_traffic() -> None:
         ({"verdicts": "reaction-zone=not_triggered standing=held"}, False, ELSEWHERE),
         ({"verdicts": "reaction-zone=unfair standing=held"}, False, ELSEWHERE),
         ({"outcome": "error", "error": "it died"}, False, ERROR),
-        ({"outcome": "invalid", "verdicts": "reaction-zone=held", "breach": "b"}, False, ELSEWHERE),
+        (
+            {"outcome": "invalid", "verdicts": "reaction-zone=held", "breach": EARLY},
+            False,
+            ELSEWHERE,
+        ),
+        ({"outcome": "invalid", "verdicts": "reaction-zone=held", "breach": LATE}, False, PASSES),
         ({"verdicts": "reaction-zone=violated standing=violated"}, True, FAILS),
     ],
 )
