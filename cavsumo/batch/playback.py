@@ -18,7 +18,7 @@ from cavsumo.results.traces import Trace, trace_of
 
 # Columns of which the agents and the reruns decide, so that a playback does not reproduce them.
 NOT_PLAYED_BACK = frozenset(
-    {"agent", "forecast", "forecast_value"}
+    {"agent", "forecast", "forecast_value", "grade"}
     | {"avoidable", "avoidable_ideal", "reference", "last_chance_s", "margin_s", "avoidable_note"}
 )
 AGAIN = "playback"  # label of the agent in a plan that is played back

@@ -161,10 +161,14 @@ def _ways(met: TrackToViolation) -> list[_WayThere]:
 
 
 def _speeds(met: TrackToViolation) -> list[float]:
-    """The nominal speed of a pedestrian, and that of the body at the violation [m/s]."""
+    """The speed of the body at the violation, also as a whole number [m/s].
+
+    Of a pedestrian first the nominal one.
+    """
     there = round(met.track[-1][2], 1)
-    nominal = [met.kind.v_max] if met.kind.name in WALKING else []
-    return [*dict.fromkeys([*nominal, there, float(round(there))])]
+    if met.kind.name in WALKING:
+        return [*dict.fromkeys([met.kind.v_max, there])]
+    return [*dict.fromkeys([there, float(round(there))])]
 
 
 def _one_leg(

@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 from cavsumo.kept.candidate import Candidate, FixedPart, of_testers
 from cavsumo.kept.motion import BodyMotion, MotionLeg, TrackToViolation, in_legs
 from cavsumo.kept.shrinking import subsets
-from cavsumo.model.bodies import NOOP
+from cavsumo.model.bodies import NOOP, WALKING, Kind
 from cavsumo.model.departures import Entry, Trip, Walk
 
 SHARES = (7 / 8, 3 / 4, 1 / 2, 1 / 4)  # of the time before the violation that are cut at once
@@ -133,7 +133,7 @@ class Reductions:
     def numbers(self, candidate: Candidate) -> Iterator[Candidate]:
         """Rounder numbers."""
         for place, motion in enumerate(candidate.motions):
-            for rounder in _rounder(motion, self.fixed.dt):
+            for rounder in _rounder(motion, self.fixed.kind, self.fixed.dt):
                 yield _with_motion(candidate, place, rounder)
         if candidate.entry is not None:
             edge, lane, along, speed = candidate.entry
@@ -181,8 +181,8 @@ def _later(candidate: Candidate, steps: int, tracks: Tracks, dt: float) -> Candi
     )
 
 
-def _rounder(motion: BodyMotion, dt: float) -> Iterator[BodyMotion]:
-    """A motion with one rounder number."""
+def _rounder(motion: BodyMotion, kind: Kind, dt: float) -> Iterator[BodyMotion]:
+    """A motion with one rounder number; the nominal speed of a pedestrian is round enough."""
     start, second = motion.start, max(1, round(1.0 / dt))
     for digits in PLACES:
         yield replace(
@@ -197,7 +197,8 @@ def _rounder(motion: BodyMotion, dt: float) -> Iterator[BodyMotion]:
         for unit in (second, second // 2):
             if i and unit:
                 yield _leg(motion, i, MotionLeg(max(1, round(step / unit) * unit), speed))
-        for digits in PLACES[:2]:
+        nominal = kind.name in WALKING and speed == kind.v_max
+        for digits in () if nominal else PLACES[:2]:
             yield _leg(motion, i, MotionLeg(step, round(speed, digits)))
 
 

@@ -180,13 +180,18 @@ def judged(was: Mapping[str, str], row: Mapping[str, str], *, stands: bool) -> t
     verdict, name = said.get(was["assertion"], row["outcome"]), was["assertion"]
     if verdict == VIOLATED:
         return FAILS, _violated(row, name)
-    if row["outcome"] == "invalid":
+    if row["outcome"] == "invalid" and _time_of(row["breach"]) <= float(was["time_s"]):
         return ELSEWHERE, f"a tester broke a rule of the world: {row['breach']}"
     if stands or (said.get(STANDING) == VIOLATED and name != STANDING):
         return STANDS, "the ego stands without reason and does not drive on"
     if verdict == HELD:
         return PASSES, f"{name} was triggered by {row['tester'] or 'the situation'} and held"
     return ELSEWHERE, f"{name}: {verdict.replace('_', ' ')}"
+
+
+def _time_of(breach: str) -> float:
+    """The time of a breach [s]; one after the end of the record, when bodies go on, is none."""
+    return float(breach.rpartition(" at ")[2].removesuffix(" s"))
 
 
 def _violated(row: Mapping[str, str], name: str) -> str:

@@ -153,6 +153,17 @@ def test_what_cannot_be_made_smaller_is_refused(
     assert not (tmp_path / "b.cavtest").exists()
 
 
+def test_an_unpreventable_failure_is_kept_too(networks: dict[str, Path], tmp_path: Path) -> None:
+    """Its grade comes from the reference driver, who is not asked when it is played back."""
+    words = ["run", "--net", str(networks["pedestrians"]), "--ego", "constant", "--runs", "12"]
+    command(tmp_path, *words, "--agent", "proximity", "-o", "a.csv", "-q", "--exit-zero")
+    rows = [row for row in read_rows(tmp_path / "a.csv") if row["avoidable"] == "0"]
+    done = command(tmp_path, "keep", "a.csv", rows[0]["run"], "-o", "a.cavtest")
+    assert done.returncode == 0, done.stderr
+    small = command(tmp_path, "minimise", "a.cavtest", "--replays", "5")
+    assert "would not have avoided it" in small.stdout
+
+
 def test_a_file_is_enough_to_play_it(kept: Path, tmp_path: Path) -> None:
     """Elsewhere, without results, network and routes; compared bit for bit."""
     for name in ("all.cavtest", "small.cavtest"):
