@@ -54,7 +54,7 @@ def words(facts: EstimateFacts, bound: float | None = None) -> str:
         f"({found.level:.0%})",
         f"in an hour of exposure ({facts.per_hour:g} arrivals): "
         f"{hour[0]:.3g} [{hour[1]:.3g}, {hour[2]:.3g}]",
-        f"{facts.method}: {spent}; ended because {facts.over}; {_gain(facts.gain)}",
+        f"{facts.method}: {spent}; ended because {facts.over}{_gain(facts.gain)}",
     ]
     if not found.failures:
         asked = bound or found.upper / 10
@@ -154,9 +154,11 @@ def _interval(found: Estimate) -> str:
 def _gain(gain: tuple[float, float, float]) -> str:
     """The gain over Monte Carlo in words."""
     value, low, high = gain
+    if value == 1.0:
+        return ""
     if not math.isfinite(value):
-        return "gain over Monte Carlo unknown"
-    return f"{value:.3g} [{low:.3g}, {high:.3g}] times Monte Carlo's precision an episode"
+        return "; gain over Monte Carlo unknown"
+    return f"; an episode is worth {value:.3g} [{low:.3g}, {high:.3g}] of Monte Carlo"
 
 
 def _finite(number: float) -> float | None:
