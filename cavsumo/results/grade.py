@@ -6,15 +6,17 @@ Every episode has one, triggered or not, so a search can climb from nobody met t
 [0, inf)    a preventable failure: the impact speed [m/s], else the robustness lost
 [-1, 0)     a failure that was not preventable: -s / (1 + s) for s seconds that the reference
             driver was short of
-[-2, -1)    met, and held: -1 - t / (1 + t) for a margin of t seconds
+[-2, -1)    met, and held: -1 - t / (1 + t), where t is the spare time of the ego, or what a human
+            driver was short of if that is more
 [-3, -2)    unfair: somebody came too late for anyone: -2 - s / (1 + s) for s seconds too late
-[-4, -3)    nobody met: -3 - t / (1 + t) for a margin of t seconds
+[-4, -3)    nobody met: -3 - t / (1 + t) for a spare time of t seconds
 -5          invalid: a tester broke the rules of the world
 ==========  ====================================================================================
 
-The margin is the smallest gap between the moving ego and a tester that is not behind it, in the
-time that the ego needs for it: who passes somebody closely and fast has as little of it as who
-stops late.
+The spare time is the least over the episode of how long the moving ego could still have waited
+before it had to brake fully to stop before a tester, or of how long that tester would still need
+to come into its strip, if that is longer. A tester that is in the strip as far ahead as the ego
+needs to stop, and one beside the ego that touches it, both leave no time.
 """
 
 from __future__ import annotations
@@ -24,7 +26,6 @@ from typing import TYPE_CHECKING
 
 from cavsumo.assertions.contacts import STANDING_MPS
 from cavsumo.assertions.judgement import HELD, INVALID, UNFAIR, VIOLATED
-from cavsumo.model.geometry import gap
 
 if TYPE_CHECKING:
     from cavsumo.model.snapshot import BodyState
@@ -34,6 +35,7 @@ if TYPE_CHECKING:
 INVALID_GRADE = -5.0
 MOST_S = 10.0  # a larger margin counts as this one, and so does a time that is not known
 SLOWEST_MPS = 1.0  # a slower ego counts as so fast
+BRAKES_MPS2 = 9.0  # fully, as the reaction zone assumes
 
 
 def grade(episode: Episode, avoidability: Avoidability | None) -> float:
@@ -48,10 +50,10 @@ def grade(episode: Episode, avoidability: Avoidability | None) -> float:
         assert avoidability is not None
         return -_share(_short(avoidability))
     if said.verdict == HELD and said.tester:
-        return -1.0 - _share(_margin(episode))
+        return -1.0 - _share(max(_spare(episode), episode.short or 0.0))
     if said.verdict == UNFAIR:
-        return -2.0 - _share(_late(episode))
-    return -3.0 - _share(_margin(episode))
+        return -2.0 - _share(MOST_S if episode.short is None else episode.short)
+    return -3.0 - _share(_spare(episode))
 
 
 def _share(seconds: float) -> float:
@@ -59,44 +61,34 @@ def _share(seconds: float) -> float:
     return seconds / (1.0 + seconds)
 
 
-def _margin(episode: Episode) -> float:
-    """How far the moving ego and the testers were apart, at most ``MOST_S`` [s]."""
+def _spare(episode: Episode) -> float:
+    """The spare time of the ego, at most ``MOST_S`` [s]."""
     least = MOST_S
     for snapshot in episode.seen:
         ego = snapshot.ego
         if ego.v <= STANDING_MPS:
             continue
-        v = max(SLOWEST_MPS, ego.v)
+        cos, sin, own, v = math.cos(ego.o), math.sin(ego.o), ego.body.kind, max(SLOWEST_MPS, ego.v)
+        room = own.length / 2 + v * v / (2.0 * BRAKES_MPS2)
         for tester in snapshot.testers:
-            apart = math.hypot(tester.x - ego.x, tester.y - ego.y)
-            near = apart - ego.body.kind.reach - tester.body.kind.reach < least * v
-            if near and not _passed(ego, tester):
-                least = min(least, gap(ego.box, tester.box) / v)
+            dx, dy, reach = tester.x - ego.x, tester.y - ego.y, tester.body.kind.reach
+            ahead = dx * cos + dy * sin
+            # not passed, and perhaps nearer than any before
+            if -own.length / 2 - reach <= ahead < room + reach + least * v:
+                beside = abs(dy * cos - dx * sin) - own.width / 2
+                least = min(least, _left(tester, ego.o, ahead - room, beside, v))
     return least
 
 
-def _passed(ego: BodyState, tester: BodyState) -> bool:
-    """Whether a whole tester lies behind the ego's rear bumper."""
-    ahead = (tester.x - ego.x) * math.cos(ego.o) + (tester.y - ego.y) * math.sin(ego.o)
-    return ahead + tester.body.kind.reach < -ego.body.kind.length / 2
+def _left(tester: BodyState, heading: float, ahead: float, beside: float, v: float) -> float:
+    """How long the centre of a tester, so far beyond the stopping way and beside it, leaves [s]."""
+    from cavsumo.agents.driving import extent  # the columns are read where shapely is not loaded
+
+    along, across = extent(tester, heading)
+    return max(0.0, (ahead - along) / v, (beside - across) / tester.body.kind.v_max)
 
 
 def _short(avoidability: Avoidability) -> float:
     """How much earlier the reference driver had to perceive the risk [s]."""
     perceived, last = avoidability.perceived, avoidability.last_chance
     return MOST_S if perceived is None or last is None else max(0.0, perceived - last)
-
-
-def _late(episode: Episode) -> float:
-    """How much earlier a body that came too late had to come for a human driver to stop [s].
-
-    That driver loses as much speed as if it braked fully after its delay and half of the rise.
-    """
-    # The columns, which need this file, are read where nothing heavy may be imported.
-    from cavsumo.egos.reference.encounter import EVALUATION_S
-    from cavsumo.egos.reference.human import DELAY_S, FULL_MPS2, RISE_S
-
-    reaction = EVALUATION_S + DELAY_S + RISE_S / 2
-    v, apart = episode.judgement.ego_speed or 0.0, episode.contacts.min_gap
-    left = apart / v if v > 0.0 and math.isfinite(apart) else 0.0
-    return max(0.0, v / (2.0 * FULL_MPS2) + reaction - left)

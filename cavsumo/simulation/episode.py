@@ -32,7 +32,8 @@ class Episode:
     ego steers itself; ``forecast``: what the testers said of it beforehand; ``notes``: what the
     first agent noted of it for its searcher; ``starts``: where they started, and ``waited``: where
     they were while the ego entered; ``departures``: of the background, None where they were not
-    recorded or do not tell all of it.
+    recorded or do not tell all of it; ``short``: what a human driver was short of in a test that
+    was held or unfair, as ``foresight.human_short``.
     """
 
     judgement: Judgement
@@ -62,6 +63,7 @@ class Episode:
     departures: Demand | None = None
     drives: bool = False
     forecast: Forecast | None = None
+    short: float | None = None
     notes: str = ""
 
     @property

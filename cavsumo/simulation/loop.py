@@ -10,7 +10,7 @@ import math
 from collections.abc import Sequence
 
 from cavsumo.agents.base import Agent, Forecast
-from cavsumo.assertions.base import INVALID, VIOLATED, Judgement, weightiest
+from cavsumo.assertions.base import HELD, INVALID, UNFAIR, VIOLATED, Judgement, weightiest
 from cavsumo.assertions.blame import blamed
 from cavsumo.assertions.contacts import ContactMonitor
 from cavsumo.assertions.validity import ValidityMonitor
@@ -22,6 +22,7 @@ from cavsumo.model.snapshot import Snapshot
 from cavsumo.simulation.ego_progress import ego_progress
 from cavsumo.simulation.ending import all_behind, at_end, over
 from cavsumo.simulation.episode import Episode, Joint
+from cavsumo.simulation.foresight import human_short
 from cavsumo.simulation.moving import moved
 from cavsumo.simulation.rewards import Feedback, RewardMonitor
 from cavsumo.simulation.setup import Setup
@@ -185,6 +186,8 @@ class EpisodeLoop:
         episode.invalid, episode.breach = spoilt is not None, spoilt or self._validity.first
         if episode.outcome == VIOLATED:
             episode.blame = blamed(self.scene, self.history, episode.judgement)
+        elif episode.outcome in (HELD, UNFAIR):
+            episode.short = human_short(self.scene, self.history, episode.judgement)
         return episode
 
     def _observe(self, snapshot: Snapshot) -> None:

@@ -34,25 +34,30 @@ class Ability:
     slowest_mps: float = 0.0  # does not notice slower bodies
     shrinks: bool = False  # takes everybody for a point
     nearest_only: bool = False
-    through_others: bool = True  # sees bodies behind others
+    hidden_rad: float = 0.0  # loses sight of bodies so near to the direction of a nearer one
+    recognises_s: float = 0.0  # notices them again so long after that
+    groups_m: float = 0.0  # takes bodies so near to a nearer one for that one
     blind_left: bool = False
+    aside_m: float = 0.0  # sees everybody so much farther beside its way
     # prediction
     horizon_s: float = math.inf
     room_m: float = ROOM_M
-    trusts_standing_s: float = 0.0  # who stood within that time still stands
-    trusts_oncoming: bool = False  # those who come towards it go past
+    trusts_standing_s: float = 0.0  # who stood beside its way stays there for so long
+    trusts_oncoming: bool = False  # those who come towards it step aside
     trusts_leaving_s: float = 0.0  # who has left its way does not come back for so long
     stops_at_lane: bool = False  # whoever is not in its way yet will wait
     # decision
     delay_s: float = 0.0
     latest_ttc_s: float = math.inf
-    gambles: bool = False  # passes before somebody where it reckons that it can
+    gambles_s: float = 0.0  # passes before somebody who comes no more than so much too early
     forgives: bool = False  # yields to each body once
     # action
     decel: float = HARDEST_MPS2
     jerk: float = math.inf
     lets_go_s: float = math.inf  # brakes no longer than this
     creeps_mps: float = 0.0
+    # the test
+    testers: int = 1  # with fewer pedestrians there is no fault
 
 
 class Driver:
@@ -67,6 +72,7 @@ class Driver:
         self._past: deque[Snapshot] = deque(maxlen=1 + round(self.ability.lag_s / scene.dt))
         self._seen: Snapshot | None = None
         self._alarms: deque[bool] = deque(maxlen=1 + round(self.ability.delay_s / scene.dt))
+        self._hidden: dict[str, float] = {}
         self._left: dict[str, float] = {}
         self._stood: dict[str, float] = {}
         self._yielded: set[str] = set()
@@ -100,15 +106,26 @@ class Driver:
         bodies = [*self._seen.testers, *self._seen.background]
         bodies = [b for b in bodies if self._notices(ego, b)]
         bodies.sort(key=lambda b: math.dist((b.x, b.y), (ego.x, ego.y)))
-        if not able.through_others:
-            bodies = [b for i, b in enumerate(bodies) if not _hidden(ego, b, bodies[:i])]
+        if able.hidden_rad:
+            bodies = [b for i, b in enumerate(bodies) if self._recognises(snapshot, b, bodies[:i])]
+        if able.groups_m:
+            bodies = [b for i, b in enumerate(bodies) if not _near(b, bodies[:i], able.groups_m)]
         return bodies[:1] if able.nearest_only else bodies
+
+    def _recognises(self, snapshot: Snapshot, body: BodyState, nearer: list[BodyState]) -> bool:
+        """Whether no nearer body hides a body, nor has done so shortly before."""
+        able, bearing = self.ability, _bearing(snapshot.ego, body)
+        apart = [abs(math.remainder(bearing - _bearing(snapshot.ego, b), math.tau)) for b in nearer]
+        if min(apart, default=math.inf) < able.hidden_rad:
+            self._hidden[body.id] = snapshot.time
+        since = snapshot.time - self._hidden.get(body.id, -math.inf)
+        return since >= able.recognises_s
 
     def _notices(self, ego: BodyState, body: BodyState) -> bool:
         """Whether it notices a body."""
         able = self.ability
         dx, dy = body.x - ego.x, body.y - ego.y
-        bearing = math.remainder(math.atan2(dy, dx) - ego.o, math.tau)
+        bearing = math.remainder(_bearing(ego, body) - ego.o, math.tau)
         return (
             math.hypot(dx, dy) <= able.sight_m
             and abs(bearing) <= able.half_view_rad
@@ -123,6 +140,7 @@ class Driver:
             kind = replace(body.body.kind, length=0.01, width=0.01)
             body = body._replace(body=body.body._replace(kind=kind))
         met = encounter(self.scene, snapshot, body)
+        met = met._replace(beside=met.beside + able.aside_m)
         if not self._heeds(snapshot, name, met):
             if name in self._yielding:
                 self._yielded.add(name)
@@ -146,32 +164,30 @@ class Driver:
             self._left[name] = snapshot.time
         if time > min(able.horizon_s, able.latest_ttc_s):
             return False
-        if abs(met.inward) < 0.1 and abs(met.onward) < 0.1:
+        if abs(met.inward) < 0.1 and abs(met.onward) < 0.1 and met.beside > 0.0:
             self._stood[name] = snapshot.time
-        since = snapshot.time - self._stood.get(name, -math.inf)
-        if since < able.trusts_standing_s and met.beside > 0.0:
+        if snapshot.time - self._stood.get(name, -math.inf) < able.trusts_standing_s:
             return False
-        if able.trusts_oncoming and met.beside > 0.0 and met.onward < -0.2:
+        if able.trusts_oncoming and met.onward < -0.2:
             return False
-        since = snapshot.time - self._left.get(name, -math.inf)
-        if since < able.trusts_leaving_s and met.beside > 0.0:
+        if snapshot.time - self._left.get(name, -math.inf) < able.trusts_leaving_s:
             return False
         if able.stops_at_lane and met.beside > 0.0:
             return False
-        passes = (max(0.0, met.gap) + met.length) / v
-        return not (able.gambles and met.inward > 0.0 and met.beside / met.inward > passes - 0.6)
-
-
-def _hidden(ego: BodyState, body: BodyState, nearer: list[BodyState]) -> bool:
-    """Whether a nearer body hides one from the ego's centre."""
-    angle = math.atan2(body.y - ego.y, body.x - ego.x)
-    for other in nearer:
-        far = math.dist((other.x, other.y), (ego.x, ego.y))
-        width = math.atan2(other.body.kind.reach, far)
-        there = math.atan2(other.y - ego.y, other.x - ego.x)
-        if abs(math.remainder(angle - there, math.tau)) < width:
+        if not able.gambles_s or met.inward <= 0.0:
             return True
-    return False
+        passes = (max(0.0, met.gap) + met.length) / v
+        return met.beside / met.inward < passes - able.gambles_s
+
+
+def _bearing(ego: BodyState, body: BodyState) -> float:
+    """The direction from the ego to a body [rad]."""
+    return math.atan2(body.y - ego.y, body.x - ego.x)
+
+
+def _near(body: BodyState, others: list[BodyState], distance: float) -> bool:
+    """Whether a body is so near to one of the others."""
+    return any(math.dist((body.x, body.y), (b.x, b.y)) < distance for b in others)
 
 
 class Careful(Driver):
@@ -186,25 +202,26 @@ FAULTS = {
     "SeesThePast": Ability(lag_s=1.8),
     "MissesTheSlow": Ability(slowest_mps=0.6),
     "SeesPoints": Ability(shrinks=True, room_m=0.0),
-    "SeesTheNearestOnly": Ability(nearest_only=True),
-    "IgnoresOcclusion": Ability(through_others=False),
+    "SeesTheNearestOnly": Ability(nearest_only=True, testers=2),
+    "IgnoresOcclusion": Ability(hidden_rad=0.15, recognises_s=1.5, testers=2),
+    "TakesGroupsForOne": Ability(groups_m=4.0, testers=2),
     "BlindToTheLeft": Ability(blind_left=True),
+    "MisjudgesTheSide": Ability(aside_m=1.3),
     # prediction
-    "LooksOneSecondAhead": Ability(horizon_s=0.8, room_m=0.0),
+    "LooksHalfASecondAhead": Ability(horizon_s=0.5),
     "TrustsTheStanding": Ability(trusts_standing_s=2.5),
     "TrustsTheOncoming": Ability(trusts_oncoming=True),
     "TrustsTheLeaving": Ability(trusts_leaving_s=3.0),
     "ExpectsAllToWait": Ability(stops_at_lane=True),
-    "NoMargin": Ability(room_m=-0.4),
     # decision
     "ReactsLate": Ability(delay_s=2.0),
     "BrakesLate": Ability(latest_ttc_s=0.7),
-    "Gambles": Ability(gambles=True),
+    "Gambles": Ability(gambles_s=1.6),
     "ForgivesOnce": Ability(forgives=True),
     "LooksRarelyAndForgets": Ability(every_s=0.8, trusts_leaving_s=1.5),
     # action
     "WeakBrakes": Ability(decel=1.8),
-    "SlowBrakes": Ability(jerk=2.0),
+    "SlowBrakes": Ability(jerk=1.0),
     "LetsGo": Ability(lets_go_s=0.6),
     "Creeps": Ability(creeps_mps=1.5),
 }

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import importlib
 import importlib.util
+import json
 import re
 import sys
 from collections.abc import Callable, Iterator
@@ -411,15 +412,22 @@ def test_the_tables_of_the_experiments(
 
 
 def test_scores_against_faulty_drivers(
-    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], tmp_path: Path
 ) -> None:
-    """One driver, ten episodes of a search and of timing."""
+    """One driver, ten episodes of a search and of timing; the table once more from the file."""
     monkeypatch.syspath_prepend(str(ROOT / "experiments" / "search"))
     monkeypatch.setenv("PYTHONPATH", "")
-    words = ["score.py", "--driver", "LetsGo", "--seeds", "1", "--episodes", "10", "-j", "1"]
-    monkeypatch.setattr(sys, "argv", [*words, "--net", "pedestrians"])
+    file = str(tmp_path / "trials.jsonl")
+    words = ["--driver", "SeesTheNearestOnly", "--seed", "1", "--episodes", "10", "-j", "1"]
+    monkeypatch.setattr(sys, "argv", ["score.py", *words, "--net", "pedestrians", "-o", file])
     script("search/score").main()
-    first, *_, last = capsys.readouterr().out.splitlines()
+    table = capsys.readouterr().out
+    first, *_, last = table.splitlines()
     assert first.split() == ["driver", "portfolio", "timing"]
-    assert last.startswith("timing: ")
-    assert "of 1 trials failed a faulty driver" in last
+    assert last.startswith("timing: a faulty driver failed in ")
+    assert " of 1 trials" in last
+    trials = [json.loads(line) for line in Path(file).read_text(encoding="utf-8").splitlines()]
+    assert [(t["driver"], t["testers"]) for t in trials] == [("SeesTheNearestOnly", 2)] * 2
+    monkeypatch.setattr(sys, "argv", ["score.py", "--read", file])
+    script("search/score").main()
+    assert capsys.readouterr().out == table

@@ -24,8 +24,8 @@ Capture = pytest.CaptureFixture[str]
 RUNS = 24
 
 
-def _search(file: Path, *more: str, runs: int = RUNS) -> int:
-    words = ["search", "--net", "pedestrians", "--ego", "constant", "--runs", str(runs), "-q"]
+def _search(file: Path, *more: str, runs: int = RUNS, net: str = "pedestrians") -> int:
+    words = ["search", "--net", net, "--ego", "constant", "--runs", str(runs), "-q"]
     return main([*words, "-o", str(file), *more])
 
 
@@ -101,6 +101,23 @@ def test_a_point_is_replayed_from_its_trace_and_from_the_rows(
     assert "the same" in capsys.readouterr().out
 
 
+@pytest.mark.parametrize("kind", ["car", "bicycle"])
+def test_vehicles_are_searched_and_replayed(kind: str, tmp_path: Path, capsys: Capture) -> None:
+    """With a second one; rows two at a time, and replays from trace and rows, are the same."""
+    one, both = (_folder(tmp_path / name) for name in ("one", "both"))
+    words = ["--kind", kind, "--testers", "2", "--exit-zero"]
+    assert _search(one, *words, runs=12, net="crossing") == 0
+    assert _search(both, *words, "-j", "2", "--trace", "none", runs=12, net="crossing") == 0
+    bare = [row | {"trace": ""} for row in rows(one)]
+    assert rows(both) == bare
+    failed = [row for row in rows(one) if row["outcome"] == "violated"]
+    assert any(row["avoidable"] == "1" for row in failed)
+    capsys.readouterr()
+    for file in (one, both):
+        assert main(["replay", str(file), failed[-1]["run"]]) == 0
+        assert "the same" in capsys.readouterr().out
+
+
 def test_the_summary_names_common_features(tmp_path: Path, capsys: Capture) -> None:
     """How many failures, how many kinds, when the first came; with none, what was seen."""
     words = ["search", "--net", "pedestrians", "--runs", "10", "--method", "random"]
@@ -114,6 +131,24 @@ def test_the_summary_names_common_features(tmp_path: Path, capsys: Capture) -> N
     said = capsys.readouterr().out
     assert "search: no preventable failure in 10 episodes" in said
     assert "of the 10 points drawn at random none failed, so at most 30.8% of the space" in said
+
+
+def test_an_episode_ends_when_nobody_can_meet_the_ego(tmp_path: Path, capsys: Capture) -> None:
+    """Outcomes and grades are those of the whole episodes; that the ego arrived is not known."""
+    files = tmp_path / "cut.csv", tmp_path / "whole.csv"
+    for file, words in zip(files, ([], ["--param", "cut=false"]), strict=True):
+        _search(file, "--method", "random", "--trace", "all", *words)
+    cut, whole = map(rows, files)
+    learned = "outcome", "verdicts", "avoidable", "impact_speed_mps", "trigger_time_s", "grade"
+    assert [[r[c] for c in learned] for r in cut] == [[r[c] for c in learned] for r in whole]
+    shorter = [i for i, r in enumerate(cut) if float(r["time_s"]) < float(whole[i]["time_s"])]
+    assert shorter
+    for i in shorter:
+        assert (cut[i]["arrived"], cut[i]["lost_s"], whole[i]["arrived"]) == ("", "", "1")
+    for words in ([], ["--playback"]):
+        capsys.readouterr()
+        assert main(["replay", str(files[0]), str(shorter[0]), *words]) == 0
+        assert "the same" in capsys.readouterr().out
 
 
 @pytest.mark.parametrize("method", ["portfolio", "cma", "explore"])
@@ -145,24 +180,6 @@ def test_an_earlier_search_of_another_space_is_refused(
     assert _search(file, "--param", f"search.earlier={found}", *more) == Exit.USAGE
     assert said in capsys.readouterr().err
     assert not list(tmp_path.iterdir())
-
-
-def test_an_episode_ends_when_nobody_can_meet_the_ego(tmp_path: Path, capsys: Capture) -> None:
-    """Outcomes and grades are those of the whole episodes; that the ego arrived is not known."""
-    files = tmp_path / "cut.csv", tmp_path / "whole.csv"
-    for file, words in zip(files, ([], ["--param", "cut=false"]), strict=True):
-        _search(file, "--method", "random", "--trace", "all", *words)
-    cut, whole = map(rows, files)
-    learned = "outcome", "verdicts", "avoidable", "impact_speed_mps", "trigger_time_s", "grade"
-    assert [[r[c] for c in learned] for r in cut] == [[r[c] for c in learned] for r in whole]
-    shorter = [i for i, r in enumerate(cut) if float(r["time_s"]) < float(whole[i]["time_s"])]
-    assert shorter
-    for i in shorter:
-        assert (cut[i]["arrived"], cut[i]["lost_s"], whole[i]["arrived"]) == ("", "", "1")
-    for words in ([], ["--playback"]):
-        capsys.readouterr()
-        assert main(["replay", str(files[0]), str(shorter[0]), *words]) == 0
-        assert "the same" in capsys.readouterr().out
 
 
 @pytest.mark.parametrize(

@@ -1,34 +1,32 @@
-"""The search for tests without SUMO: the space, the searchers, and the grade of an episode."""
+"""The search for tests without SUMO: the space and the searchers."""
 
 from __future__ import annotations
 
 import dataclasses
+import json
 import math
 from collections.abc import Callable
-from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 import pytest
 
 from cavsumo.agents.searched import programme_of
-from cavsumo.assertions.judgement import HELD, NOT_TRIGGERED, UNFAIR, VIOLATED, Judgement
-from cavsumo.errors import InputError
-from cavsumo.model.bodies import PEDESTRIAN
+from cavsumo.errors import InputError, NetworkError
+from cavsumo.model.bodies import CAR, PEDESTRIAN
 from cavsumo.model.carriageway import Limit, Start
+from cavsumo.model.geometry import Box, gap
 from cavsumo.model.scenario import BatchPlan
 from cavsumo.network.site import Site
-from cavsumo.results.grade import INVALID_GRADE, grade
-from cavsumo.searchers.manoeuvres import MANOEUVRES, ManoeuvreSearch
+from cavsumo.searchers.drives import Drives, drive_of
+from cavsumo.searchers.manoeuvres import MANOEUVRES, PAIRS, ManoeuvreSearch
 from cavsumo.searchers.methods import SEARCHERS, check_method, searcher_of
-from cavsumo.searchers.neighbours import NeighbourSearch
 from cavsumo.searchers.places import Place
 from cavsumo.searchers.portfolio import Portfolio
-from cavsumo.searchers.protocol import GENERATION, PlayedPoint, RandomSearch
-from cavsumo.searchers.space import Point, Space, space_of
+from cavsumo.searchers.protocol import GENERATION, PlayedPoint
+from cavsumo.searchers.space import FURTHER, TOGETHER, Point, Space, space_of
 from cavsumo.searchers.walks import Walks, walk_of
 from cavsumo.searchers.words import Failure, in_common
-from cavsumo.simulation.avoidability import Avoidability
 
 SIDES = (False, True)  # from the right, from the left
 
@@ -106,6 +104,81 @@ def test_a_programme_stays_within_natural_limits() -> None:
         assert walk.pause == 0.0 or walk.resume is None
 
 
+def test_two_that_act_together_meet_the_ego_near_each_other(space: Space) -> None:
+    """At about the same moment, wherever the first one is; or as the ego reacts to it."""
+    rng = np.random.default_rng(2)
+    for _ in range(30):
+        point = rng.random(space.dimension)
+        point[space.index(1, "company")] = 0.8
+        point[space.index(1, "reaction")] = 0.1
+        (one, first), (other, second) = space.seen(point)
+        assert abs(one.along - other.along) <= 8.0
+        assert abs(first.cue - second.cue) <= 0.5
+        point[space.index(1, "reaction")] = 0.7
+        assert space.seen(point)[1][1].cue == "brakes"
+        point[space.index(1, "reaction")] = 0.9
+        assert space.seen(point)[1][1].cue == "speeds up"
+
+
+def test_an_ego_that_decides_now_and_then_has_a_phase(space: Space) -> None:
+    """One number more, for the first body alone."""
+    slow = dataclasses.replace(space, every=1.0)
+    assert slow.dimension == space.dimension + 1
+    point = np.full(slow.dimension, 0.5)
+    point[slow.index(0, "phase")] = 0.3
+    (_, first), (_, second) = slow.seen(point)
+    assert (first.every, first.phase) == (1.0, 0.3)
+    assert second.every == 0.0
+
+
+@pytest.fixture
+def drives(staged: Callable[..., tuple[BatchPlan, Site]]) -> Space:
+    """Two cars at the crossing."""
+    return space_of(staged("crossing", kind="car")[1], CAR, ((0,), (1,)))
+
+
+def test_vehicles_start_on_approaches_apart_from_each_other(drives: Space) -> None:
+    """In time for the ego, from all sides that there are."""
+    whence = {place.whence for place in drives.movements.places}
+    assert whence == {"from the left", "from the right", "oncoming", "ahead of the ego"}
+    rng = np.random.default_rng(3)
+    for _ in range(50):
+        bodies = drives.played(rng.random(drives.dimension))
+        (a, b), ego = (place.start for place, _ in bodies), drives.site.route.path.at(0.0)
+        assert a.approach is not None
+        assert a.approach in drives.site.approaches
+        for start in (a, b):
+            assert 0.0 < start.v <= CAR.v_max
+        boxes = [Box(s.x, s.y, s.o, CAR.length, CAR.width) for s in (a, b)]
+        assert gap(*boxes) > 3.0
+        assert min(gap(box, Box(*ego, CAR.length, CAR.width)) for box in boxes) > 3.0
+
+
+def test_the_side_of_a_vehicle_is_seen_from_the_ego(drives: Space) -> None:
+    """Far from the ego's path it lies on that side."""
+    for place in drives.movements.places:
+        start = place.start
+        beside = drives.site.route.path.project(start.x, start.y).lateral
+        if place.whence in ("from the left", "from the right") and abs(beside) > 20.0:
+            assert (beside > 0.0) == (place.whence == "from the left")
+
+
+def test_a_memory_of_vehicles_is_plain_data(drives: Space) -> None:
+    """The same programmes again after a way through JSON."""
+    point = np.random.default_rng(4).random(drives.dimension)
+    point[drives.index(1, "company")] = 0.5
+    for memory, (_, programme) in zip(drives.memories(point), drives.seen(point), strict=True):
+        (plain,) = json.loads(json.dumps(memory))["programmes"]
+        assert programme_of(plain) == programme
+
+
+def test_no_way_of_a_vehicle_is_refused(drives: Space) -> None:
+    """The sentence names the network and the way out."""
+    bare = dataclasses.replace(drives.site, approaches=())
+    with pytest.raises(NetworkError, match="a search finds no way on which a car meets the ego"):
+        space_of(bare, CAR, ((0,),))
+
+
 def _sphere(point: Point) -> PlayedPoint:
     """A failure near the middle of the cube."""
     far = float(np.abs(point - 0.5).mean())
@@ -146,17 +219,6 @@ def test_what_was_good_is_looked_at_more_closely(space: Space, method: str) -> N
     assert np.mean(sorted(grades[-200:])[100:]) > np.mean(sorted(grades[:200])[100:]) + 0.03
 
 
-def test_neighbours_are_those_of_fair_tests(space: Space) -> None:
-    """Of points that nobody met, or unfairly, only while there are no others."""
-    rng = np.random.default_rng(2)
-    points = list(rng.random((10, space.dimension)))
-    searcher = NeighbourSearch(space, rng, RandomSearch(space, rng))
-    for grades in ([-3.2] * 10, [-2.4, -1.5] + [-3.2] * 8):
-        searcher.tell(points, [PlayedPoint(grade, False) for grade in grades])
-        near = [np.argmin([np.linalg.norm(one - p) for p in points]) for one in searcher.ask()]
-        assert (set(near) == {1}) is (max(grades) > -2.0)
-
-
 def test_a_portfolio_goes_on_from_what_was_found(space: Space) -> None:
     """After failures near the middle most points are there, as neighbours of them."""
     portfolio, far = Portfolio(space, np.random.default_rng(1)), list[float]()
@@ -182,13 +244,19 @@ def test_a_method_whose_package_is_missing_is_refused(
         check_method("diversity", space)
 
 
-def test_every_manoeuvre_is_within_the_space(space: Space) -> None:
-    """Its numbers are numbers of the space, in [0, 1], and a round has all of them."""
-    for ranges in MANOEUVRES[space.movements.name].values():
-        assert set(ranges) <= set(space.movements.meanings)
+@pytest.mark.parametrize("kind", ["walks", "drives"])
+def test_every_manoeuvre_is_within_the_space(kind: str, space: Space, drives: Space) -> None:
+    """Its numbers are coordinates, in [0, 1]; half of the points have two that act together."""
+    there = space if kind == "walks" else drives
+    pairs = [ranges for pair in PAIRS[kind] for ranges in pair]
+    for ranges in (*MANOEUVRES[kind].values(), *pairs):
+        assert set(ranges) <= {*there.movements.meanings, *FURTHER}
         assert all(0.0 <= low <= high <= 1.0 for low, high in ranges.values())
-    drawn = [p for _ in range(2) for p in ManoeuvreSearch(space, np.random.default_rng(1)).ask()]
+    searcher = ManoeuvreSearch(there, np.random.default_rng(1))
+    drawn = [p for _ in range(6) for p in searcher.ask()]
     assert all((point >= 0.0).all() and (point <= 1.0).all() for point in drawn)
+    together = [p for p in drawn if there.share(p, 1, "company") >= TOGETHER]
+    assert len(drawn) / 3 < len(together) < len(drawn)
 
 
 def test_features_that_most_failures_share() -> None:
@@ -203,33 +271,17 @@ def test_features_that_most_failures_share() -> None:
     assert in_common([], "pedestrian") == ""
 
 
-def _episode(judgement: Judgement, outcome: str = "", min_gap: float = 1.0) -> Any:
-    """An episode that nobody saw, so that nobody was near."""
-    contacts = SimpleNamespace(min_gap=min_gap)
-    return SimpleNamespace(
-        judgement=judgement, outcome=outcome or judgement.verdict, contacts=contacts, seen=[]
-    )
-
-
-def test_grades_order_episodes() -> None:
-    """From invalid over nobody met, unfair, held and unpreventable to a hard impact."""
-    hit = Judgement("collision", VIOLATED, "tester0", impact_speed=3.0, robustness=-3.0)
-    late = Judgement("reaction-zone", UNFAIR, "tester0", ego_speed=8.0)
-    cases = [
-        (_episode(hit, "invalid"), None),
-        (_episode(Judgement("", NOT_TRIGGERED)), None),
-        (_episode(late, min_gap=1.0), None),
-        (_episode(late, min_gap=3.0), None),
-        (_episode(Judgement("reaction-zone", HELD, "tester0")), None),
-        (_episode(hit), Avoidability(False, perceived=5.0)),
-        (_episode(hit), Avoidability(False, last_chance=4.0, perceived=5.0)),
-        (_episode(hit), Avoidability(False, last_chance=4.8, perceived=5.0)),
-        (_episode(hit), Avoidability(True, last_chance=5.0, perceived=4.0)),
-        (_episode(dataclasses.replace(hit, impact_speed=8.0)), Avoidability(True)),
-    ]
-    grades = [grade(*case) for case in cases]
-    assert grades == sorted(grades)
-    assert len(set(grades)) == len(grades)
-    assert grades[0] == INVALID_GRADE
-    assert grades[-2:] == [3.0, 8.0]
-    assert sum(g >= 0.0 for g in grades) == 2
+@pytest.mark.parametrize(
+    ("numbers", "words"),
+    [
+        ({"depth": 0.9}, "runs the line"),
+        ({"depth": 0.2, "resume": 0.2}, "creeps over the line and stops before the ego's way"),
+        ({"depth": 0.4, "resume": 0.5}, "stops in the ego's way, waits for the ego"),
+    ],
+)
+def test_features_of_vehicles(drives: Space, numbers: dict[str, float], words: str) -> None:
+    """Kind, side, speed, manner, and whether others took part."""
+    place = next(p for p in drives.movements.places if p.whence == "from the right")
+    drive = drive_of(dict.fromkeys(Drives.meanings, 0.5) | numbers, CAR)
+    said = in_common([Failure(place, drive, 1)], "car")
+    assert said == f"car from the right, 5.0 m/s, {words}, with another one"
