@@ -1,7 +1,7 @@
 """Branches of running episodes: are they exact, and what do they cost?
 
     python benchmarks/branching.py [--net NET]... [--branches N] [--costs N] [--many N]
-                                   [--failures N]
+                                   [--failures N] [--part PART]...
 
 Identity: episodes with traffic are branched in several timesteps, by a fork and by a replay, with
 the same agents, with others, with other actions, another ego and other random numbers; every
@@ -25,7 +25,7 @@ import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 from unittest import mock
 
 from cavsumo.agents.base import AGENTS
@@ -50,6 +50,7 @@ DEFAULT, ONE = "default", "default without the ideal driver"
 NOBODY: Callable[..., None] = lambda *_: None  # noqa: E731  # in place of the ideal driver's answer
 OUTSIDE = Path(__file__).resolve().parent.parent / "examples/egos/stop_for_pedestrians.py"
 PREFIXES = (20, 60, 200)
+PARTS = ("identity", "cost", "resources", "failures")
 SLOW = {"ego": "constant", "ego_params": {"speed": 1.0}}  # still on its way after all of them
 BLIND = {"ego": "constant", "ego_params": {"speed": 7.0}, "agents": ["timing"]}
 
@@ -62,14 +63,19 @@ def main() -> None:
     parser.add_argument("--costs", type=int, default=9, help="repetitions, medians are shown")
     parser.add_argument("--many", type=int, default=1000, help="branches of which nothing may stay")
     parser.add_argument("--failures", type=int, default=10, help="episodes that are to be judged")
+    parser.add_argument("--part", action="append", choices=PARTS, help="all by default")
     options = parser.parse_args()
-    nets = options.net or NETS
-    good = all([identity(net, kind, options.branches) for net in nets for kind in ("", "car")])
-    good &= refused(nets[0])
-    for net in nets:
-        cost(net, options.costs)
-    leftovers(nets[0], options.many)
-    good &= all([failures(net, options.failures) for net in nets])
+    nets, chosen, good = options.net or NETS, options.part or PARTS, True
+    if "identity" in chosen:
+        good = all([identity(net, kind, options.branches) for net in nets for kind in ("", "car")])
+        good &= refused(nets[0])
+    if "cost" in chosen:
+        for net in nets:
+            cost(net, options.costs)
+    if "resources" in chosen:
+        good &= leftovers(nets[0], options.many)
+    if "failures" in chosen:
+        good &= all([failures(net, options.failures) for net in nets])
     sys.exit(0 if good else 1)
 
 
@@ -208,30 +214,45 @@ def whole(runner: EpisodeRunner, steps: int) -> None:
         loop.step()
 
 
-def leftovers(net: str, many: int) -> None:
-    """Print what is left of many branches in this process."""
+def leftovers(net: str, many: int) -> bool:
+    """Print what this process has at times during many branches; whether nothing stays of them."""
     with running(net) as runner:
         loop = begun(runner, 0)
         loop.step()
         told = [Continuation(seed=i, steps=1) for i in range(many)]
         for _ in branches(loop, told[:50]):
             pass
-        before = held()
-        for _ in branches(loop, told):
-            pass
-        print(f"resources before and after {many} branches: {before}; {held()}", flush=True)
-
-
-def held() -> str:
-    """The processes, descriptors and memory of this process."""
-    here = Path("/proc/self")
-    children = (here / "task" / str(os.getpid()) / "children").read_text().split()
-    pages = int((here / "statm").read_text().split()[1])
-    megabytes = pages * resource.getpagesize() / 1e6
-    return (
-        f"{len(children)} children, {len(list((here / 'fd').iterdir()))} descriptors, "
-        f"{megabytes:.1f} MB"
+        before, peak = Held.now(), 0
+        for i, _ in enumerate(branches(loop, told)):
+            if i % max(1, many // 100) == 0:
+                peak = max(peak, Held.now().children)
+        after = Held.now()
+    print(
+        f"resources before {many} branches: {before}; after: {after}; at most {peak} children "
+        "at a time",
+        flush=True,
     )
+    return (after.children, after.descriptors) == (before.children, before.descriptors)
+
+
+class Held(NamedTuple):
+    """The processes, descriptors and memory [MB] of this process."""
+
+    children: int
+    descriptors: int
+    megabytes: float
+
+    @classmethod
+    def now(cls) -> Held:
+        """At this moment."""
+        here = Path("/proc/self")
+        children = (here / "task" / str(os.getpid()) / "children").read_text().split()
+        pages = int((here / "statm").read_text().split()[1])
+        megabytes = pages * resource.getpagesize() / 1e6
+        return cls(len(children), len(list((here / "fd").iterdir())), megabytes)
+
+    def __str__(self) -> str:
+        return f"{self.children} children, {self.descriptors} descriptors, {self.megabytes:.1f} MB"
 
 
 def failures(net: str, runs: int) -> bool:

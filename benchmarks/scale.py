@@ -1,6 +1,6 @@
 """A report with its page, a merge and a resumed batch of very many rows: time and memory.
 
-    python benchmarks/scale.py [--rows N] [--played N] [--other FOLDER]
+    python benchmarks/scale.py [--rows N] [--played N] [--other FOLDER] [--what NAME]...
 
 Episodes are played once; their rows are repeated under the run numbers and seeds that a batch of
 that size has, as one results file and as two shards. Each command is a process of its own;
@@ -42,13 +42,15 @@ def main() -> None:
     parser.add_argument("--rows", type=int, default=1_000_000)
     parser.add_argument("--played", type=int, default=200, help="episodes an agent")
     parser.add_argument("--other", type=Path, help="another checkout to compare with")
+    parser.add_argument("--what", action="append", choices=COMMANDS, help="all by default")
     options = parser.parse_args()
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         grown(played(folder, options.played), folder, options.rows)
         checkouts = [ROOT, *([options.other.resolve()] if options.other else [])]
         print(f"{options.rows} rows, {(folder / 'all.csv').stat().st_size / 1e6:.0f} MB")
-        same = all([measured(what, folder, checkouts) for what in COMMANDS])
+        chosen = options.what or COMMANDS
+        same = all([measured(what, folder, checkouts) for what in chosen])
     sys.exit(0 if same else 1)
 
 

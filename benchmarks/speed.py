@@ -4,17 +4,18 @@
                                [--episodes N] [--rounds N] [--no-command]
 
 Another version of the repository, in another folder, is measured in the same run, in turns, against
-the bare loop of its own episodes (``throughput``). Each version plays in a process of its own, each
-episode in several rounds, of which the fastest counts. *Alone* is the loop of agents, SUMO and
-assertions; *whole* what the simulating process does for a row by default: the loop with everybody
-recorded, reruns with the reference driver, row and trace. *Command* is ``cavsumo run`` as users run
-it, all its processes together, less the same command with one episode; it needs many episodes, or
-the noise of two starts weighs more than they do.
+the bare loop of its own episodes (``throughput``). Each version plays in a process of its own, and
+so does its bare loop, each episode in several rounds, of which the fastest counts. *Alone* is the
+loop of agents, SUMO and assertions; *whole* what the simulating process does for a row by default:
+the loop with everybody recorded, reruns with the reference driver, row and trace. *Command* is
+``cavsumo run`` as users run it, all its processes together, less the same command with one episode;
+it needs many episodes, or the noise of two starts weighs more than they do.
 """
 
 from __future__ import annotations
 
 import argparse
+import gc
 import importlib
 import os
 import subprocess
@@ -24,6 +25,7 @@ from collections.abc import Callable
 from contextlib import ExitStack
 from dataclasses import dataclass
 from functools import partial
+from itertools import chain
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
@@ -53,12 +55,13 @@ def main() -> None:
     parser.add_argument("--episodes", type=int, default=60)
     parser.add_argument("--rounds", type=int, default=3)
     parser.add_argument("--no-command", action="store_true", help="do not measure the command")
-    parser.add_argument("--play", action="store_true", help=argparse.SUPPRESS)
+    parser.add_argument("--play", choices=("bare", "cavsumo"), help=argparse.SUPPRESS)
     options = parser.parse_args()
     nets = options.net or NETS
     testers = options.testers or [1, 3]
     if options.play:
-        play(Measured(nets[0], testers[0], options.agent, options.episodes))
+        batch = Measured(nets[0], testers[0], options.agent, options.episodes)
+        play(batch, bare=options.play == "bare")
         return
     folders = [ROOT] + ([options.other.resolve()] if options.other else [])
     print(f"{'ms an episode, times bare':34}{'bare':>8}" + "".join(f"{name:>16}" for name in SHOWN))
@@ -82,13 +85,16 @@ def compare(
     batch: Measured, folders: list[Path], rounds: int, *, command: bool
 ) -> list[list[float]]:
     """Milliseconds of an episode in each version: bare, alone, whole, command; in turns."""
-    players = [Player(folder, batch) for folder in folders]
+    ways = ("bare", "cavsumo")
+    players = [[Player(folder, batch, way) for way in ways] for folder in folders]
     alone: list[list[list[float]]] = [[] for _ in players]  # of each version and episode
     for run in range(batch.episodes):
-        taken = [[player.played(run) for player in players] for _ in range(rounds)]
+        taken = [
+            [bare.played(run) + ours.played(run) for bare, ours in players] for _ in range(rounds)
+        ]
         for own, times in zip(alone, zip(*taken, strict=True), strict=True):
             own.append([min(of) for of in zip(*times, strict=True)])
-    for player in players:
+    for player in chain.from_iterable(players):
         player.close()
     found = [[1e3 * sum(of) / batch.episodes for of in zip(*own, strict=True)] for own in alone]
     if command:
@@ -99,10 +105,10 @@ def compare(
 
 
 class Player:
-    """A process with a version of the code, which plays an episode both ways when it is told."""
+    """A process with a version of the code, which plays episodes one way when it is told."""
 
-    def __init__(self, folder: Path, batch: Measured) -> None:
-        words = ["--play", "--net", batch.net, "--testers", str(batch.testers)]
+    def __init__(self, folder: Path, batch: Measured, way: str) -> None:
+        words = ["--play", way, "--net", batch.net, "--testers", str(batch.testers)]
         words += ["--agent", batch.agent, "--episodes", str(batch.episodes)]
         self._process = subprocess.Popen(
             [sys.executable, "-P", __file__, *words],  # this folder is not searched for modules
@@ -113,7 +119,7 @@ class Player:
         )
 
     def played(self, run: int) -> list[float]:
-        """Seconds of the bare loop, of the simulator alone and of a whole episode."""
+        """Seconds of the bare loop, or of the simulator alone and of a whole episode."""
         assert self._process.stdin is not None
         assert self._process.stdout is not None
         self._process.stdin.write(f"{run}\n")
@@ -130,25 +136,39 @@ def environment(folder: Path) -> dict[str, str]:
     return dict(os.environ) | {"PYTHONPATH": f"{folder}{os.pathsep}{folder / 'benchmarks'}"}
 
 
-def play(batch: Measured) -> None:
-    """Play the episodes that stdin names, in each way, and tell the seconds."""
-    bare: Any = importlib.import_module("throughput")
+def play(batch: Measured, *, bare: bool) -> None:
+    """Play the episodes that stdin names, by the bare loop or by cavsumo, and tell the seconds."""
+    loop: Any = importlib.import_module("throughput")
     given = {"net": batch.net, "testers": batch.testers, "agents": (batch.agent,)}
     told, sys.stdout = sys.stdout, sys.stderr
     tracks: dict[str, Any] = {}
+    if bare:
+        start_as_ever()
     with ExitStack() as stack:
         version = opened(given, stack)
+        gc.collect()
+        gc.freeze()  # as simulating processes do
         for run in sys.stdin:
-            seed = version.job(int(run)).seed
-            if run not in tracks:
+            one = version.job(int(run))
+            if bare and run not in tracks:
                 frames = version.alone(int(run), record=True).frames
-                tracks[run] = [[bare.to_bare(t) for t in s.testers] for s in frames]
-            calls = (
-                partial(bare.bare_loop, version.world, seed, tracks[run]),
+                tracks[run] = [[loop.to_bare(t) for t in s.testers] for s in frames]
+            calls: list[Callable[[], Any]] = [
                 partial(version.alone, int(run)),
-                partial(version.whole, version.job(int(run))),
-            )
+                partial(version.whole, one),
+            ]
+            if bare:
+                calls = [partial(loop.bare_loop, version.world, one.seed, tracks[run])]
             print(*map(seconds, calls), file=told, flush=True)
+
+
+def start_as_ever() -> None:
+    """Let SUMO start as in any program: its XML parser is not kept from one start to the next."""
+    try:
+        connection: Any = importlib.import_module("cavsumo.sumo.connection")
+    except ImportError:  # version 0.1
+        return
+    connection.keep_xml = lambda _: None
 
 
 def seconds(call: Callable[[], Any]) -> float:

@@ -20,7 +20,7 @@ from cavsumo.batch.episode_runner import EpisodeRunner
 from cavsumo.batch.jobs import job
 from cavsumo.batch.prepared import prepare
 from cavsumo.model.scenario import plan_from
-from cavsumo.results.frame_text import frame_lines
+from cavsumo.results.frame_text import frames_text
 from cavsumo.results.trace_file import GZIP, LEVEL, packed, unpacked
 from cavsumo.results.traces import parsed, trace_text
 from cavsumo.simulation.loop import play
@@ -65,7 +65,7 @@ def traces(name: str, episodes: int, rounds: int) -> tuple[list[str], float]:
             episode = play(runner.setup, runner.agents_of(one), one.seed, record=True)
             actions = by_body(runner.setup, episode.actions)
             spent += min(
-                seconds(lambda: trace_text({}, frame_lines(episode.frames, actions)))  # noqa: B023
+                seconds(lambda: trace_text({}, frames_text(episode.frames, actions)))  # noqa: B023
                 for _ in range(rounds)
             )
     return texts, 1e3 * spent / episodes

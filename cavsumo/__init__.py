@@ -17,6 +17,10 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from cavsumo.agents.base import Agent as Agent
     from cavsumo.api.episodes import RecordedEpisode as RecordedEpisode
+    from cavsumo.api.estimating import Estimation as Estimation
+    from cavsumo.api.estimating import estimate as estimate
+    from cavsumo.api.kept import minimise as minimise
+    from cavsumo.api.kept import regress as regress
     from cavsumo.api.results import Results as Results
     from cavsumo.api.results import load as load
     from cavsumo.api.running import run as run
@@ -41,9 +45,13 @@ _PUBLIC = {
     "run": "api.running",
     "run_study": "api.running",
     "search": "api.running",
+    "estimate": "api.estimating",
     "load": "api.results",
     "suite": "api.suites",
+    "minimise": "api.kept",
+    "regress": "api.kept",
     "Results": "api.results",
+    "Estimation": "api.estimating",
     "RecordedEpisode": "api.episodes",
     "Scenario": "model.scenario",
     "Agent": "agents.base",

@@ -20,7 +20,7 @@ from cavsumo.model.bodies import Action
 from cavsumo.model.scenario import BatchPlan
 from cavsumo.model.snapshot import Snapshot
 from cavsumo.network.site import Site
-from cavsumo.results.frame_text import frame_lines
+from cavsumo.results.frame_text import frames_text
 from cavsumo.results.provenance import checksums, versions
 from cavsumo.results.reading import read_manifest, read_rows
 from cavsumo.results.trace_file import unpacked
@@ -69,8 +69,7 @@ def traces(file: Path) -> dict[str, str]:
 
 def frame(snapshot: Snapshot, actions: Sequence[Action] = ()) -> dict[str, Any]:
     """A snapshot as a frame of a trace."""
-    (line,) = frame_lines([snapshot], [actions])
-    found: dict[str, Any] = json.loads(line)
+    found: dict[str, Any] = json.loads(frames_text([snapshot], [actions]))
     return found
 
 

@@ -106,16 +106,16 @@ class Agent:
         at the horizon, where only the simulation ends.
         """
 
+    def notes(self) -> str:
+        """Notes on the episode for its searcher, a cell of its row; empty for none."""
+        return ""
+
     def rests(self) -> bool:
         """Whether none of its bodies moves any more in this episode; a promise.
 
         Where all agents say so of bodies that the ego has left behind, the episode ends early.
         """
         return False
-
-    def notes(self) -> str:
-        """Notes on the episode for its searcher, a cell of its row; empty for none."""
-        return ""
 
     def recall(self) -> Any:
         """The knowledge of the agent, as plain data; None when it does not learn."""

@@ -8,6 +8,7 @@ with walks at random times; then it plays, and solves again at intervals.
 
 from __future__ import annotations
 
+import dataclasses
 import json
 import math
 from collections.abc import Mapping, Sequence
@@ -47,7 +48,8 @@ from cavsumo.model.scene import Scene
 from cavsumo.model.snapshot import BodyState, Snapshot
 
 MODEL_DT = 0.1  # timestep of the model, unless those of the scenario are longer [s]
-AIMS = ("violation", "test")
+AIMS = ("preventable", "violation", "test")
+NOTICE_STEP_S, LONGEST_NOTICE_S = 0.5, 2.5  # a plan for each step; seen longer is seen in time
 EXPLORED_AIMS = (0.3, 1.3)  # part of the reaction zone into which exploring walks step
 INDIFFERENT = 0.02  # a move is kept unless another is better by this
 OFF_THE_LANE_S = 1.1  # a body that stands farther away does not stop the ego
@@ -56,7 +58,7 @@ BACK = 2  # to where it waited, when there is nothing to be had; the model knows
 KNOWN = "best-response"
 
 
-@lru_cache(maxsize=8)
+@lru_cache(maxsize=16)
 def _planned(counts: str, dt: float, aim: Aim) -> Plan:
     """The plan for counts as text; agents of one process share it."""
     from cavsumo.agents.planning.solving import best_response
@@ -73,32 +75,40 @@ class BestResponseAgent(Agent):
     FILES = ("model",)
 
     PARAMETERS: ClassVar[Mapping[str, str]] = {
-        "aim": "'violation' of the assertion, or 'test': its precondition",
+        "aim": "'preventable' violation of the assertion, any 'violation', or 'test': its "
+        "precondition",
         "model": "manifest of an earlier batch, or a JSON file, with the counts to begin with",
         "learn": "false to play what is known without counting on",
         "explore": "episodes with walks timed at random before the first plan",
         "replan": "episodes after which the plan is made anew",
         "missed": "price of an episode without a test; a test that the ego passed costs 1",
         "unfair": "price of an unfair episode",
+        "unpreventable": "price of a violation that a human driver would not have prevented either",
         "confidence": "of sets around the counts, from which the ego picks the worst; 0 for none",
         "run_up_m": "distance to the carriageway at which it waits [m]",
     }
 
     def __init__(
         self,
-        aim: str = "violation",
+        aim: str = "preventable",
         model: str | None = None,
         learn: bool = True,
         explore: int = 60,
         replan: int = 60,
         missed: float = 1.0,
         unfair: float = 2.0,
+        unpreventable: float = 1.0,
         confidence: float = 0.0,
         run_up_m: float = 0.8,
     ) -> None:
-        prices = Prices(1.0, number("missed", missed, 0.0, 100.0), number("unfair", unfair, 0, 100))
+        prices = Prices(
+            missed=number("missed", missed, 0.0, 100.0),
+            unfair=number("unfair", unfair, 0.0, 100.0),
+            unpreventable=number("unpreventable", unpreventable, 0.0, 100.0),
+        )
         trust = number("confidence", confidence, 0.0, 0.999999)
-        self.aim = Aim(choice("aim", aim, AIMS) == "violation", prices, trust or None)
+        self.aim = Aim(choice("aim", aim, AIMS) != "test", prices, trust or None)
+        self.prevents = aim == "preventable"
         self.learn = self.learns = truth("learn", learn)
         self.explore = int(number("explore", explore, 0))
         self.replan = int(number("replan", replan, 1))
@@ -135,12 +145,18 @@ class BestResponseAgent(Agent):
                 self.planned = json.dumps(self.counts.plain(), sort_keys=True)
             self.episodes += 1
         self._every = max(1, round(MODEL_DT / scene.dt))
-        dt = scene.dt * self._every
-        self.plan = _planned(self.planned, dt, self.aim) if self.planned else None
-        self.watch = AccelerationReader(dt)
+        self.watch = AccelerationReader(scene.dt * self._every)
         self.coordinates = [Coordinates(scene, i) for i in range(len(scene.bodies))]
         self._bodies = [PlannedBody(self, i) for i in self.owned]
         self._told: tuple[int, int, int] | None = None
+
+    def plan(self, index: int) -> Plan | None:
+        """The plan of a body; None while the agent explores."""
+        if not self.planned:
+            return None
+        notice = notice_of(self.coordinates[index]) if self.prevents else None
+        aim = dataclasses.replace(self.aim, notice=notice)
+        return _planned(self.planned, self.watch.dt, aim)
 
     def choose_action(self, snapshot: Snapshot) -> tuple[Action, ...]:
         if snapshot.step % self._every == 0:
@@ -181,6 +197,18 @@ class BestResponseAgent(Agent):
         return situation(*worst, snapshot.ego.v)
 
 
+def notice_of(coordinates: Coordinates) -> float | None:
+    """For how long a body that walks across can be seen on the road before the ego's strip [s].
+
+    In steps, of which each needs a plan of its own; None for a body without a way across.
+    """
+    met = coordinates.meeting
+    if met is None:
+        return None
+    seen = (met.strip - met.way.enter) / coordinates.kind.v_max
+    return min(LONGEST_NOTICE_S, max(0.0, round(seen / NOTICE_STEP_S) * NOTICE_STEP_S))
+
+
 def entry_time(kind: Kind, here: Relative, dt: float) -> float:
     """Time until a body that walks from now on enters the ego's strip, negative since then [s].
 
@@ -199,7 +227,8 @@ class PlannedBody:
         self.coordinates = agent.coordinates[index]
         self.crossing = CrossingWalk(agent.scene)
         clearance, self.explores = agent.run_up_m, None
-        if agent.plan is None:
+        self.plan = agent.plan(index)
+        if self.plan is None:
             clearance *= agent.rng.random()
             self.explores = Timing(agent.scene, index, agent.rng.uniform(*EXPLORED_AIMS))
         self.waiting = ApproachKerb(agent.scene, index, clearance)
@@ -245,7 +274,7 @@ class PlannedBody:
         if here.left <= 0.0:
             return WALK
         here = here._replace(gap=here.gap + self._aside(state))
-        plan, kind = self.agent.plan, self.coordinates.kind
+        plan, kind = self.plan, self.coordinates.kind
         assert plan is not None
         entry = entry_time(kind, here, self.scene.dt) / plan.grid.dt
         if entry <= plan.grid.committed:

@@ -114,10 +114,14 @@ class Run(Manoeuvre):
         if not self.possible(state):
             return None
         approach, path = self.approach, self.scene.ego_path
-        time, v = self.course.time_to(state, approach.enter, self.gaining)
+        time, v = self.arrival(state)
         turn = self.course.path.at(approach.enter)[2] - path.at(approach.ego_enter)[2]
         front, ego_v = ego.after(time + self.scene.dt)
         return approach.ego_enter - front + drift(v * math.cos(turn), ego_v, MAX_DECEL), ego_v
+
+    def arrival(self, state: BodyState) -> tuple[float, float]:
+        """When and how fast a vehicle that begins now comes into the ego's way [s, m/s]."""
+        return self.course.time_to(state, self.approach.enter, self.gaining)
 
 
 class Brake(Manoeuvre):

@@ -15,6 +15,7 @@ AGENT_NAMES = Names(
         "best-response": "best_response",
         "election": "election",
         "expectiminimax": "expectiminimax",
+        "exposure": "exposed",
         "noop": "base",
         "programmed-random": "programmed",
         "proximity": "programmed",
@@ -26,14 +27,16 @@ AGENT_NAMES = Names(
         "timing": "programmed",
     },
     {
-        "best-response": "aim model learn explore replan missed unfair confidence run_up_m",
+        "best-response": "aim model learn explore replan missed unfair unpreventable confidence "
+        "run_up_m",
         "election": "distance_m rule idle manoeuvre",
         "expectiminimax": "against price_per_s grid_s top accel",
+        "exposure": "method exposure half_width bound",
         "programmed-random": "rate_per_s epsilon idle manoeuvre",
         "proximity": "distance_m idle manoeuvre",
         "q-learning": "alpha gamma epsilon half_life hold_s weights learn",
         "random": "rate_per_s epsilon between",
-        "search": "method earlier cut",
+        "search": "method cut earlier",
         "timing": "aim idle manoeuvre",
     },
 )
@@ -42,6 +45,8 @@ SEARCH = "search"  # the agent whose tests a searcher chooses, by one of these m
 SEARCH_METHODS = (
     "portfolio", "random", "manoeuvres", "neighbours", "cma", "diversity", "tree", "explore",
 )  # fmt: skip
+EXPOSURE = "exposure"  # the agent whose random vectors an estimator chooses, by one of these
+ESTIMATE_METHODS = ("auto", "monte-carlo", "importance")
 
 PREFIX = "policy:"
 

@@ -66,6 +66,11 @@ class DriveProgramme(NamedTuple):
         """Brake [m/s2]."""
         return BRAKING_MPS2 + self.effort * (HARD_MPS2 - BRAKING_MPS2)
 
+    @property
+    def hesitates(self) -> bool:
+        """Whether it stops before the ego's way for a fixed time."""
+        return self.depth is not None and self.depth < 0.0 and self.resume is None
+
 
 class Legs:
     """Progress of a manoeuvre of two legs.
@@ -93,7 +98,22 @@ class ProgrammedRun(Legs, Run):
             for v in (programme.speed, programme.speed_2)
         )
         super().__init__(scene, approach, first)
-        self.gaining, self._depth = programme.gaining, programme.depth
+        self.gaining, self._depth, self._pause = programme.gaining, programme.depth, programme.pause
+        self._hesitates = programme.hesitates
+        self._from_rest: tuple[float, float] | None = None
+
+    def arrival(self, state: BodyState) -> tuple[float, float]:
+        """As of any run; of one that hesitates with its stop, after which it goes on."""
+        if self._depth is None or not self._hesitates or self.stands:
+            return super().arrival(state)
+        stop = max(self.approach.enter + self._depth, self.approach.wait)
+        if self._from_rest is None:
+            x, y, o = self.approach.path.at(stop)
+            rest = BodyState(state.body, x, y, 0.0, o)
+            self._from_rest = self._then.time_to(rest, self.approach.enter, self.gaining)
+        time, v = self.course.time_to(state, stop, self.gaining)
+        slowing = v / (2.0 * BRAKING_MPS2)  # longer than at the speed before
+        return time + slowing + self._pause + self._from_rest[0], self._from_rest[1]
 
     def act(self, state: BodyState, others: Iterator[BodyState]) -> Action:
         allowed = self.course.room(state, others)

@@ -9,7 +9,7 @@ from __future__ import annotations
 import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from pydantic import BaseModel, ConfigDict
@@ -27,6 +27,13 @@ FARTHEST = 1e8  # m from the origin, and m/s, rad
 Teams = Sequence[Sequence[int]]  # for each agent the indices of its bodies
 
 
+class Hold(NamedTuple):
+    """A timestep of a record behind which a body goes on when the ego is where it was then."""
+
+    step: int
+    along: float  # arc length of the ego's centre on its path [m]
+
+
 @dataclass(frozen=True)
 class Recorded:
     """Data that determine an episode when it is played back.
@@ -38,6 +45,7 @@ class Recorded:
         waited: where they waited for the ego to enter, if some were put elsewhere after that.
         departures: of the background; None for the scenario's own demand.
         approaches: types of the site's approaches, among which the starts' places are numbered.
+        holds: of each tester, None for one that acts by the clock alone; empty if all do.
     """
 
     seed: int
@@ -46,6 +54,7 @@ class Recorded:
     waited: Sequence[StartRecord] = ()
     departures: Demand | None = None
     approaches: Sequence[str] = ()
+    holds: Sequence[Hold | None] = ()
 
     def memories(self, teams: Teams) -> tuple[dict[str, Any], ...]:
         """The knowledge of the agents that play it back, as plain data."""
@@ -54,6 +63,7 @@ class Recorded:
                 "starts": [self.starts[i] for i in team if self.starts],
                 "waited": [self.waited[i] for i in team if self.waited],
                 "actions": [[joint[i] for i in team] for joint in self.actions],
+                **({"holds": [self.holds[i] for i in team]} if self.holds else {}),
             }
             for team in teams
         )
@@ -81,32 +91,50 @@ class RecordedAgent(Agent):
     def __init__(self) -> None:
         self._actions: list[tuple[Action, ...]] = []
         self._done, self.ends = 0, False
+        self._holds: list[Hold | None] = []
 
     def reset(self, scene: Scene, owned: Sequence[int], rng: np.random.Generator) -> None:
         super().reset(scene, owned, rng)
         self._done = 0
+        self._steps = [0] * len(self._holds)
 
     def choose_action(self, snapshot: Snapshot) -> tuple[Action, ...]:
+        if self._holds:
+            return tuple(self._held(i, snapshot) for i in range(len(self._holds)))
         if self._done == len(self._actions):
             return (NOOP,) * len(self.owned)
         self._done += 1
         return self._actions[self._done - 1]
 
     def rests(self) -> bool:
-        return self.ends and self._done == len(self._actions)
+        return self.ends and min(self._steps, default=self._done) >= len(self._actions)
+
+    def _held(self, i: int, snapshot: Snapshot) -> Action:
+        """The action of a body that waits for the ego."""
+        step, hold = self._steps[i], self._holds[i]
+        if hold is not None and step == hold.step and self._ego_before(hold, snapshot):
+            return NOOP
+        self._steps[i] += 1
+        return self._actions[step][i] if step < len(self._actions) else NOOP
+
+    def _ego_before(self, hold: Hold, snapshot: Snapshot) -> bool:
+        """Whether the ego has yet to come to where a body goes on."""
+        return self.scene.ego_progress(snapshot) < hold.along
 
     def recall(self) -> Any:
         return {
             "starts": self.recorded_starts,
             "waited": self.recorded_waits,
             "actions": self._actions,
+            **({"holds": self._holds} if self._holds else {}),
         }
 
     def check_memory(self, memory: Any, bodies: int) -> None:
         found = RecordedMemory.model_validate_json(json.dumps(memory))
         for start in (*found.starts, *found.waited):
             check_start(start)
-        numbers = {len(found.starts), len(found.waited)} - {0} | {*map(len, found.actions)}
+        told = {len(found.starts), len(found.waited), len(found.holds)}
+        numbers = told - {0} | {*map(len, found.actions)}
         if numbers - {bodies} or (found.waited and not found.starts):
             raise ValueError(f"starts and actions of other than {bodies} bodies")
 
@@ -115,6 +143,7 @@ class RecordedAgent(Agent):
             [start_of(start) for start in memory[key]] for key in ("starts", "waited")
         )
         self._actions = [tuple(Action(*one) for one in joint) for joint in memory["actions"]]
+        self._holds = [hold and Hold(*hold) for hold in memory.get("holds", ())]
 
 
 class RecordedMemory(BaseModel):
@@ -125,6 +154,7 @@ class RecordedMemory(BaseModel):
     starts: list[StartRecord]
     waited: list[StartRecord]
     actions: list[list[Action]]
+    holds: list[Hold | None] = []
 
 
 def check_start(start: StartRecord) -> None:

@@ -7,7 +7,7 @@ speed, so the speed for a timestep is the mean over the timestep after it::
 
 and the body is at s(t) exactly at every timestep. Before its programme begins it stands or keeps
 its speed. When it has to begin is computed from the ego's place and speed until that moment; then
-it is fixed.
+it is fixed. A body with a track is where the track has it, from the ego's entry on.
 """
 
 from __future__ import annotations
@@ -22,9 +22,10 @@ from cavsumo.agents.base import AGENTS, Agent
 from cavsumo.errors import AgentError, EgoError
 from cavsumo.model.bodies import Action
 from cavsumo.model.curve import PlaneCurve
-from cavsumo.model.kinematics import wrap
+from cavsumo.model.kinematics import step_floats, wrap
 from cavsumo.model.motion import Motion
 from cavsumo.model.scenario.script import Begins, Programme, ScriptedTest
+from cavsumo.model.scenario.track import ScriptedTrack
 from cavsumo.model.scene import Scene
 from cavsumo.model.snapshot import BodyState, Snapshot
 
@@ -44,7 +45,7 @@ class ScriptedAgent(Agent):
         self._script, self._checked = scene.script, False
         if scene.script is not None:
             testers, begins = scene.script.testers, scene.script.commitments
-            self._followers = [Follower(testers[i], begins[i], scene.dt) for i in owned]
+            self._followers = [_follower(testers[i], begins[i], scene.dt) for i in owned]
 
     def choose_action(self, snapshot: Snapshot) -> tuple[Action, ...]:
         if self._script is None:
@@ -115,7 +116,8 @@ class Follower:
             self._commit(begins, time, front, v)
         here, there = self.along(time + dt), self.along(time + 2 * dt)
         throttle = ((there - here) / dt - state.v) / dt
-        steering = self._steering(state, here) if self.curve.legs and state.v > 0.0 else 0.0
+        steers = self.curve.legs and state.v > 0.0
+        steering = steering_to(state, *self.curve.at(here)[:2], self.dt) if steers else 0.0
         return Action(throttle, steering)
 
     def _commit(self, begins: Begins, time: float, front: float, v: float) -> None:
@@ -141,19 +143,49 @@ class Follower:
             return arrives
         return arrives - self.motion.when(begins.own_at_m - self.programme.speed_mps * time)
 
-    def _steering(self, state: BodyState, along: float) -> float:
-        """The steering by which the body is on its way after this timestep.
 
-        The kinematics moves it in the direction o + beta + theta / 2; Newton's method on that.
-        """
-        x, y, _ = self.curve.at(along)
-        kind, v = state.body.kind, state.v
-        turn = wrap(math.atan2(y - state.y, x - state.x) - state.o)
-        e, gain = 0.0, v * self.dt / kind.wheelbase
-        for _ in range(ROUNDS):
-            beta = math.atan(0.5 * math.tan(e))
-            slope = 0.5 * (1.0 + math.tan(e) ** 2) / (1.0 + 0.25 * math.tan(e) ** 2)
-            wrong = beta + gain * math.sin(beta) - turn
-            e -= wrong / (slope * (1.0 + gain * math.cos(beta)))
-            e = min(kind.steering_max, max(-kind.steering_max, e))
-        return e
+@dataclass
+class TrackFollower:
+    """One body that follows a track in one episode.
+
+    Attributes:
+        track: its places.
+        dt: length of a timestep [s].
+    """
+
+    track: ScriptedTrack
+    dt: float
+
+    def action(self, state: BodyState, time: float, front: float, v: float) -> Action:
+        """The action of a timestep; the ego is not looked at."""
+        kind, dt = state.body.kind, self.dt
+        steering = steering_to(state, *self.track.at(time + dt), dt) if state.v > 0.0 else 0.0
+        limits = kind.wheelbase, kind.v_min, kind.v_max, dt
+        x, y, *_ = step_floats(*state[1:], 0.0, steering, *limits)
+        # Who fell behind in a sharp turn catches up as fast as the track is anywhere.
+        wanted = min(kind.v_max, math.dist((x, y), self.track.at(time + 2 * dt)) / dt)
+        return Action((wanted - state.v) / dt, steering)
+
+
+def _follower(programme: Programme, begins: Begins | None, dt: float) -> Follower | TrackFollower:
+    """The follower of a body in one episode."""
+    if programme.track is not None:
+        return TrackFollower(programme.track, dt)
+    return Follower(programme, begins, dt)
+
+
+def steering_to(state: BodyState, x: float, y: float, dt: float) -> float:
+    """The steering by which a moving body is on the line to a point after a timestep [rad].
+
+    The kinematics moves it in the direction o + beta + theta / 2; Newton's method on that.
+    """
+    kind, v = state.body.kind, state.v
+    turn = wrap(math.atan2(y - state.y, x - state.x) - state.o)
+    e, gain = 0.0, v * dt / kind.wheelbase
+    for _ in range(ROUNDS):
+        beta = math.atan(0.5 * math.tan(e))
+        slope = 0.5 * (1.0 + math.tan(e) ** 2) / (1.0 + 0.25 * math.tan(e) ** 2)
+        wrong = beta + gain * math.sin(beta) - turn
+        e -= wrong / (slope * (1.0 + gain * math.cos(beta)))
+        e = min(kind.steering_max, max(-kind.steering_max, e))
+    return e

@@ -27,7 +27,6 @@ from cavsumo.model.scene import Scene
 from cavsumo.model.snapshot import Snapshot
 
 Programme = WalkProgramme | DriveProgramme
-AnyProgramme = Programme | Decisions
 
 
 @AGENTS.register(SEARCH)
@@ -36,19 +35,19 @@ class SearchAgent(Agent):
 
     PARAMETERS: ClassVar[Mapping[str, str]] = {
         "method": f"how points are chosen: {', '.join(SEARCH_METHODS)} (docs/search.md)",
-        "earlier": "results of an earlier search of the same space, whose best points come first",
         "cut": "end an episode once the ego has left all bodies behind; false to play on",
+        "earlier": "results of an earlier search of the same space, whose best points come first",
     }
     FILES = ("earlier",)
     sees_background = False
     searches = True
 
-    def __init__(self, method: str = "portfolio", earlier: str = "", cut: bool = True) -> None:
+    def __init__(self, method: str = "portfolio", cut: bool = True, earlier: str = "") -> None:
         if method not in SEARCH_METHODS:
             raise UnknownName("method", method, SEARCH_METHODS, f"agent {SEARCH}")
         self.method, self.earlier = method, earlier
         self.cut = truth("cut", cut)
-        self._programmes: list[AnyProgramme | None] = []
+        self._programmes: list[Programme | Decisions | None] = []
         self._fellows: Sequence[SearchAgent] = ()
 
     def reset(self, scene: Scene, owned: Sequence[int], rng: np.random.Generator) -> None:
@@ -99,13 +98,13 @@ class SearchAgent(Agent):
 
     def remember(self, memory: Mapping[str, Any]) -> None:
         self.recorded_starts = [start_of(start) for start in memory["starts"]]
-        self._programmes = [one and programme_of(one) for one in memory["programmes"]]
+        self._programmes = [one and _told(one) for one in memory["programmes"]]
 
 
 def _programmed(
-    scene: Scene, index: int, programme: AnyProgramme | None
-) -> ProgrammedWalk | ProgrammedDrive | DecidedWalk:
-    """A body that follows a programme; None: it stands by."""
+    scene: Scene, index: int, programme: Programme | Decisions | None
+) -> ProgrammedWalk | DecidedWalk | ProgrammedDrive:
+    """A body that follows a programme or its decisions; None: it stands by."""
     if isinstance(programme, Decisions):
         return DecidedWalk(scene, index, programme)
     if scene.starts[index].approach is None:
@@ -115,9 +114,14 @@ def _programmed(
     return ProgrammedDrive(scene, index, programme)
 
 
-def programme_of(plain: Mapping[str, Any]) -> AnyProgramme:
-    """A programme from its fields; raises TypeError for others."""
+def _told(plain: Mapping[str, Any]) -> Programme | Decisions:
+    """A programme or decisions from their fields; raises TypeError for others."""
     if "chosen" in plain:
         return Decisions(plain["arrival"], [Decision(*one) for one in plain["chosen"]])
+    return programme_of(plain)
+
+
+def programme_of(plain: Mapping[str, Any]) -> Programme:
+    """A programme from its fields; raises TypeError for others."""
     made = DriveProgramme if "effort" in plain else WalkProgramme
     return made(**plain)

@@ -14,6 +14,8 @@ from cavsumo.batch.replay import Record
 from cavsumo.batch.replaying import Located, play_again, play_back
 from cavsumo.batch.shown import shown_site
 from cavsumo.errors import InputError
+from cavsumo.kept.minimising import MOST_REPLAYS, Minimised, minimised
+from cavsumo.kept.sentence import in_words
 from cavsumo.network.site import Site
 from cavsumo.results.traces import Trace, states
 
@@ -73,11 +75,81 @@ class RecordedEpisode:
 
         write_page(self.record, self.trace, self.site, Path(file))
 
+    def minimised(self, *, replays: int = MOST_REPLAYS) -> MinimalTest:
+        """The smallest test that still fails the ego the same way; at most so many replays.
+
+        Raises InputError for an episode that is no failure or not the same when it is played back.
+        """
+        return MinimalTest(minimised(self.record, _as_it_is, replays))
+
+    def keep(self, file: str | os.PathLike[str]) -> None:
+        """Play the episode back and write it as one file (.cavtest) that is played anywhere.
+
+        Raises InputError when that is not possible.
+        """
+        from cavsumo.report.kept_files import write_kept_test
+
+        there, site = play_back(self.record, _as_it_is)
+        write_kept_test(Path(file), there, site)
+
     def __repr__(self) -> str:
         return episode_text(self.record, self.trace)
 
     def _repr_html_(self) -> str:
         return episode_html(self.record, self.trace)
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class MinimalTest:
+    """The smallest failure to which an episode was reduced.
+
+    Attributes:
+        found: the episode before and after.
+    """
+
+    found: Minimised
+
+    @property
+    def sentence(self) -> str:
+        """The test in words."""
+        return in_words(self.found.after.plan, self.found.after.row, self.found.last)
+
+    @property
+    def replays(self) -> int:
+        """How many candidates were played."""
+        return self.found.replays
+
+    @property
+    def complete(self) -> bool:
+        """Whether the test fails no more without any one of its parts."""
+        return self.found.complete
+
+    @property
+    def episode(self) -> RecordedEpisode:
+        """The smallest failure as an episode."""
+        after = self.found.after
+        assert after.trace is not None
+        return RecordedEpisode(after, after.trace, self.found.site)
+
+    def html(self, file: str | os.PathLike[str]) -> None:
+        """Write before and after, side by side, as one page."""
+        from cavsumo.report.pages.minimal.page import write_minimal_page
+
+        write_minimal_page(self.found, Path(file))
+
+    def keep(self, file: str | os.PathLike[str]) -> None:
+        """Write the test as one file (.cavtest) that is played anywhere."""
+        from cavsumo.report.kept_files import write_minimal_test
+
+        write_minimal_test(Path(file), self.found)
+
+    def __repr__(self) -> str:
+        return f"<MinimalTest: {self.sentence}>"
+
+
+def _as_it_is(record: Record) -> Record:
+    """A record that has the present paths of its files."""
+    return record
 
 
 def played_again(record: Record) -> RecordedEpisode:

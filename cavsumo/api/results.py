@@ -18,6 +18,7 @@ from cavsumo.batch.replay import Record
 from cavsumo.batch.replay import recorded as find_recorded
 from cavsumo.batch.tally import Tally
 from cavsumo.errors import InputError
+from cavsumo.kept.cavtest import is_cavtest, read_cavtest
 from cavsumo.model.objects import SentObject
 from cavsumo.model.own_folders import OwnFolder
 from cavsumo.model.scenario import BatchPlan, Scenario
@@ -247,16 +248,19 @@ def _path(name: str | os.PathLike[str] | None) -> Path | None:
     return None if name is None else Path(name)
 
 
-def load(file: str | os.PathLike[str], *, trust: bool = False) -> Results:
-    """The results that lie in a file, of ``cavsumo.run`` or the command.
+def load(file: str | os.PathLike[str], *, trust: bool = False) -> Results | RecordedEpisode:
+    """The results that lie in a file, of ``cavsumo.run`` or the command; or a kept test.
 
     Args:
-        file: the results file (.csv); its manifest lies beside it.
+        file: the results file (.csv); its manifest lies beside it. Or a kept test (.cavtest), which
+            is an episode.
         trust: let ``replay`` use an ego or an assertion that only the file names: a command to
             run, a module to import or an address to connect to.
 
     Raises InputError when the file or its manifest is missing, foreign or damaged.
     """
+    if is_cavtest(Path(file)):
+        return as_recorded(read_cavtest(Path(file), None if trust else ()).record)
     results = Results(Path(file), trusted=trust)
     results.plan, results.rows  # noqa: B018  # what is wrong comes out here
     return results

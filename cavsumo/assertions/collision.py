@@ -17,8 +17,9 @@ from cavsumo.model.snapshot import Snapshot
 class CollisionAssertion(Assertion):
     """The moving ego touches no body at all. Precondition: none, every episode is a test.
 
-    A body that touches the standing ego walked into it and violates nothing. Robustness: smallest
-    gap of the moving ego to a tester [m]; of a contact minus the closing speed [m/s].
+    A body that touches the standing ego walked into it and violates nothing; in a scripted test
+    that ends the case, because a programme goes on through the ego. Robustness: smallest gap of the
+    moving ego to a tester [m]; of a contact minus the closing speed [m/s].
     """
 
     name: ClassVar[str] = "collision"
@@ -32,6 +33,8 @@ class CollisionAssertion(Assertion):
         self._room = Room()
 
     def observe(self, snapshot: Snapshot, contacts: Sequence[Contact]) -> None:
+        if snapshot.ego.v <= STANDING_MPS and self.scene.script is not None:
+            self.decided |= any(contact.a is snapshot.ego for contact in contacts)
         if self.decided or snapshot.ego.v <= STANDING_MPS:
             return
         if any([self._room.note(snapshot.ego, tester) for tester in snapshot.testers]):

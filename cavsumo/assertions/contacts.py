@@ -7,6 +7,7 @@ on the true boxes. Background bodies among themselves are left to SUMO's own rep
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from typing import NamedTuple
 
 from cavsumo.model.geometry import Box, gap, overlap
@@ -18,6 +19,7 @@ KEPT = 64  # candidates for the smallest gap before the list is reduced
 
 
 Pair = tuple[BodyState, BodyState]
+Around = tuple[float, float, float, float]  # an upright box: its middle and half its sides [m]
 
 
 class Contact(NamedTuple):
@@ -52,14 +54,16 @@ class ContactMonitor:
         self._upper = math.inf
         self._testers: tuple[BodyState, ...] = ()
         self._among: list[Pair] = []  # those among these testers that touch
+        self._around = _box_around(())
 
     @property
     def min_gap(self) -> float:
         """Smallest gap between the ego and a tester so far [m]; infinite without testers."""
         smallest = math.inf
-        for lower, ego, tester in self._close:
-            if lower < smallest:
-                smallest = min(smallest, gap(ego.box, tester.box))
+        for lower, ego, tester in sorted(self._close, key=_lower):
+            if lower >= smallest:
+                break
+            smallest = min(smallest, gap(ego.box, tester.box))
         return smallest
 
     def observe(self, snapshot: Snapshot) -> list[Contact]:
@@ -110,9 +114,13 @@ class ContactMonitor:
         testers, background = snapshot.testers, snapshot.raw_background
         if testers is not self._testers:  # or all stand still
             self._testers, self._among = testers, _meetings_among(testers)
+            self._around = _box_around(testers)
         if not background:
             return self._among
-        return [(t, other) for t in testers for other in _touching(t, background)] + self._among
+        near = _within(self._around, background)
+        if not near:
+            return self._among
+        return [(t, other) for t in testers for other in _touching(t, near)] + self._among
 
     def _note(self, distance: float, lower: float, ego: BodyState, tester: BodyState) -> None:
         """Remember two bodies that may be the closest so far; exact gaps are dear.
@@ -152,6 +160,11 @@ def depth(a: Box, b: Box) -> float:
     )
 
 
+def _lower(candidate: tuple[float, BodyState, BodyState]) -> float:
+    """The lower bound of a gap."""
+    return candidate[0]
+
+
 def _meetings_among(testers: tuple[BodyState, ...]) -> list[Pair]:
     """Testers touching each other."""
     pairs: list[Pair] = []
@@ -166,15 +179,31 @@ def _meetings_among(testers: tuple[BodyState, ...]) -> list[Pair]:
     return pairs
 
 
-def _touching(one: BodyState, others: tuple[RawState, ...]) -> list[BodyState]:
+def _touching(one: BodyState, others: Sequence[RawState]) -> list[BodyState]:
     """Those among the others whose boxes touch one body's."""
     body, x, y, _, _ = one
-    reach = body.kind.reach
-    near = [
+    near = _within((x, y, body.kind.reach, body.kind.reach), others)
+    return [state for state in map(BodyState._make, near) if overlap(one.box, state.box)]
+
+
+def _box_around(bodies: Sequence[BodyState]) -> Around:
+    """The upright box around bodies in any direction; none around no body."""
+    if not bodies:
+        return 0.0, 0.0, -math.inf, -math.inf
+    reach = max([body.kind.reach for body, *_ in bodies])
+    xs, ys = [state[1] for state in bodies], [state[2] for state in bodies]
+    left, right, low, high = min(xs), max(xs), min(ys), max(ys)
+    half_x, half_y = (right - left) / 2 + reach, (high - low) / 2 + reach
+    # a nanometre for the rounding of the middle
+    return (left + right) / 2, (low + high) / 2, half_x + 1e-9, half_y + 1e-9
+
+
+def _within(around: Around, others: Sequence[RawState]) -> list[RawState]:
+    """Those that may touch an upright box: one axis alone rules most bodies out."""
+    x, y, half_x, half_y = around
+    return [
         other
         for other in others
-        # Centres farther apart than both reaches, on one axis alone, rule most bodies out.
-        if abs(other[1] - x) <= reach + other[0].kind.reach
-        and abs(other[2] - y) <= reach + other[0].kind.reach
+        if abs(other[1] - x) <= half_x + other[0].kind.reach
+        and abs(other[2] - y) <= half_y + other[0].kind.reach
     ]
-    return [state for state in map(BodyState._make, near) if overlap(one.box, state.box)]

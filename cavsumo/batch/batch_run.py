@@ -9,19 +9,21 @@ from pathlib import Path
 from typing import Any
 
 from cavsumo.batch.dispatch import run_batch
+from cavsumo.batch.estimating import EstimateFacts, Estimating
 from cavsumo.batch.learning import Knowledge
 from cavsumo.batch.messages import Answer
 from cavsumo.batch.prepared import OUTPUTS, PreparedBatch
 from cavsumo.batch.progress import Progress
-from cavsumo.batch.searching import SearchFacts
+from cavsumo.batch.searching import SearchFacts, Searching
 from cavsumo.batch.stopping import stopping_rule
 from cavsumo.batch.tally import Tally
 from cavsumo.egos.ego_files import OutputWatch
 from cavsumo.errors import BatchError
-from cavsumo.results.reading import COMPLETE, check_cells, rows_of
+from cavsumo.results.reading import COMPLETE, STARTING, check_cells, rows_of
 from cavsumo.results.rows import Outcome
 from cavsumo.results.writing import Recorder
 
+LARGE = 8 << 20  # bytes from which rows are worth the import of pandas, which takes 0.4 s
 LOOK_AHEAD = 4  # episodes under way or waiting for their turn, for each that is played at a time
 
 
@@ -66,11 +68,26 @@ class BatchRun:
         """Take up the recorded rows."""
         self._todo = self.prepared.plan.todo()
         self._knowledge = Knowledge(self.prepared, manifest)
-        self.tally.add_rows(self._recorded(manifest))
+        if not self._taken_up(manifest):
+            self.tally.add_rows(self._recorded(manifest))
         self._knowledge.catch_up(self.executor)
         self.left_out = self.recorder.keep(self.prepared.inputs)
         recorded = manifest["status"]
         self.status = recorded if recorded in COMPLETE else "interrupted"
+
+    def _taken_up(self, manifest: Mapping[str, Any]) -> bool:
+        """Take up the rows of a large batch of which nobody needs each; whether that is done."""
+        csv_file, starting = self.recorder.csv_file, manifest["status"] == STARTING
+        if starting or self._knowledge.looks_at_rows or csv_file.stat().st_size < LARGE:
+            return False
+        from cavsumo.batch.resume_large import taken_up  # which imports pandas
+
+        found = taken_up(csv_file, self.prepared.plan.todo())
+        if found is None:
+            return False
+        self.recorder.resume_after(manifest, found.written)
+        self.tally, self._todo = found.tally, found.todo
+        return True
 
     def _recorded(self, manifest: Mapping[str, Any]) -> Iterator[Mapping[str, Any]]:
         """The recorded rows, checked, and seen by those who learn from them."""
@@ -83,7 +100,7 @@ class BatchRun:
         """Play the remaining episodes, until the end or a reason to stop."""
         self.status = "broken"
         rule = stopping_rule(self.prepared.plan)
-        reason = rule(self.tally)
+        reason = rule(self.tally) or self._estimated()
         with Progress(self.prepared.plan.size, self.quiet, self.tally.rows) as progress:
             for answer in self._answers(self._todo, progress) if reason is None else ():
                 row = self.recorder.write(answer.outcome)
@@ -92,7 +109,7 @@ class BatchRun:
                 if self._note_outputs() or learned:
                     self.recorder.checkpoint(self._knowledge.facts())
                 progress.update(self.tally)
-                reason = rule(self.tally)
+                reason = rule(self.tally) or self._estimated(int(row["run"]))
                 if reason is not None:
                     break
         missing = self.tally.rows < self.prepared.plan.size
@@ -128,7 +145,20 @@ class BatchRun:
     @property
     def searches(self) -> dict[str, SearchFacts]:
         """The findings of the searching agents."""
-        return {label: search.facts() for label, search in self._knowledge.searches.items()}
+        found = self._knowledge.searches.items()
+        return {label: one.facts() for label, one in found if isinstance(one, Searching)}
+
+    @property
+    def estimates(self) -> dict[str, EstimateFacts]:
+        """The results of the estimating agents."""
+        found = self._knowledge.searches.items()
+        return {label: one.facts() for label, one in found if isinstance(one, Estimating)}
+
+    def _estimated(self, run: int | None = None) -> str | None:
+        """Why the batch ends with this episode, or with those recorded: its estimate is over."""
+        found = self._knowledge.searches.values()
+        ends = [one.over(run) for one in found if isinstance(one, Estimating)]
+        return next(filter(None, ends), None)
 
     def end(self) -> None:
         """Complete the manifest."""

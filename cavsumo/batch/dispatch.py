@@ -21,10 +21,10 @@ from concurrent.futures import (
 from dataclasses import dataclass
 from typing import Any
 
+from cavsumo.batch.choosers import Chooser
 from cavsumo.batch.jobs import Job, Memory, failed, job
 from cavsumo.batch.messages import Answer
 from cavsumo.batch.prepared import PreparedBatch
-from cavsumo.batch.searching import Searching
 from cavsumo.batch.worker import play
 from cavsumo.errors import BatchError, CavsumoError
 
@@ -37,7 +37,7 @@ def run_batch(
     todo: Iterable[int],
     *,
     memories: Mapping[str, Memory] | None = None,
-    searches: Mapping[str, Searching] | None = None,
+    searches: Mapping[str, Chooser] | None = None,
     ahead: int = 16,
     stopped: Callable[[], bool] = lambda: False,
 ) -> Iterator[Answer]:
@@ -49,7 +49,8 @@ def run_batch(
         executor: plays jobs by ``cavsumo.batch.worker.play``, in threads or in processes anywhere.
         todo: numbers of episodes, ascending.
         memories: the knowledge of learning agents, by name.
-        searches: the searches of searching agents, likewise; they are told of every episode.
+        searches: the choosers of agents that are told what to play, likewise; they are told of
+            every episode.
         ahead: number of episodes that run or wait for their turn.
         stopped: called all the time; once true, running episodes are finished and no more are
             begun.
@@ -88,7 +89,7 @@ class _Line:
         executor: Executor,
         todo: Iterable[int],
         memories: dict[str, Any],
-        searches: Mapping[str, Searching],
+        searches: Mapping[str, Chooser],
     ) -> None:
         self.prepared, self.executor, self.memories = prepared, executor, memories
         self.searches = searches

@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 
+from cavsumo.batch.estimating import EstimateFacts
 from cavsumo.batch.searching import SearchFacts
 from cavsumo.batch.tally import Tally
 
@@ -22,6 +23,7 @@ class Ended:
             hold however it was decided to stop.
         cut_short: somebody stopped it.
         searches: by agent, the findings of its search.
+        estimates: by agent, the result of its estimate.
         promises: by agent, the class of egos for which its forecasts hold.
     """
 
@@ -33,6 +35,7 @@ class Ended:
     sequential: bool = False
     cut_short: bool = False
     searches: Mapping[str, SearchFacts] = field(default_factory=dict)
+    estimates: Mapping[str, EstimateFacts] = field(default_factory=dict)
     promises: Mapping[str, str] = field(default_factory=dict)
 
     @property

@@ -20,11 +20,11 @@ from cavsumo.model.objects import is_instance
 from cavsumo.model.scenario import Scenario
 from cavsumo.model.seeds import episode_seed
 from cavsumo.results.columns import Row, row_of
-from cavsumo.results.frame_text import frame_lines
+from cavsumo.results.frame_text import frames_text
 from cavsumo.results.rows import Outcome
 from cavsumo.results.trace_file import packed
 from cavsumo.results.traces import origin, trace_head, trace_text
-from cavsumo.simulation.avoidability import AvoidabilityCheck
+from cavsumo.simulation.avoidability import Avoidability, AvoidabilityCheck, preventable
 from cavsumo.simulation.checkpoints import begun
 from cavsumo.simulation.episode import Episode
 from cavsumo.simulation.loop import EpisodeLoop, played_on
@@ -132,6 +132,8 @@ class EpisodeRunner:
                 reference, ideal = (
                     REFERENCES.make(name, {}) for name in (self.plan.reference, IDEAL)
                 )
+                if job.briefly:
+                    avoidability = Avoidability(preventable(check(episode), reference))
                 if checkpoint is not None:
                     beat()
                     avoidability = checkpoint.judged(episode, reference, ideal)
@@ -174,7 +176,7 @@ class EpisodeRunner:
             return b""
         played = recorded(self.setup, episode, job.seed, episode.departures)
         first = trace_head(self._origin, row, memory, episode.frames, played)
-        return packed(trace_text(first, frame_lines(episode.frames, played.actions)))
+        return packed(trace_text(first, frames_text(episode.frames, played.actions)))
 
 
 def _recall(agents: Sequence[Agent]) -> Memory | None:

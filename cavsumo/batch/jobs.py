@@ -34,6 +34,7 @@ class Job:
         memory: the agents' knowledge from earlier episodes; None for none.
         record: keep the frames in any case.
         recorded: an episode to play back instead of asking the agents; None to ask them.
+        briefly: whether a failure is judged by one rerun: preventable or not, and no more.
     """
 
     run: int
@@ -42,6 +43,7 @@ class Job:
     memory: Memory | None = None
     record: bool = False
     recorded: Recorded | None = None
+    briefly: bool = False
 
 
 def job(plan: BatchPlan, run: int, memory: Memory | None = None) -> Job:

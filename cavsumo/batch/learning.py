@@ -10,9 +10,9 @@ from collections.abc import Iterable, Mapping
 from concurrent.futures import Executor
 from typing import Any
 
+from cavsumo.batch.choosers import chooser
 from cavsumo.batch.dispatch import run_batch
 from cavsumo.batch.prepared import PreparedBatch
-from cavsumo.batch.searches import search_of
 from cavsumo.batch.tally import Row
 
 CHECKPOINT_EVERY = 20  # learning episodes between two records of the knowledge
@@ -25,7 +25,7 @@ class Knowledge:
         memories: by agent, its knowledge.
         after: by agent, the last episode from which it learned.
         owed: episodes with a recorded row from which the agents have not learned.
-        searches: by agent, its search.
+        searches: by agent, its search or its estimate.
     """
 
     def __init__(self, prepared: PreparedBatch, recorded: Mapping[str, Any]) -> None:
@@ -35,7 +35,12 @@ class Knowledge:
         self.after = {name: int(after.get(name, -1)) for name in self.names}
         self.owed: list[int] = []
         self._prepared, self._unnoted = prepared, 0
-        self.searches = {label: search_of(prepared, label) for label in prepared.cast.searchers}
+        self.searches = {label: chooser(prepared, label) for label in prepared.cast.searchers}
+
+    @property
+    def looks_at_rows(self) -> bool:
+        """Whether any agent takes up recorded rows."""
+        return bool(self.names or self.searches)
 
     def seen(self, row: Row) -> None:
         """Take up a recorded row."""
@@ -77,7 +82,7 @@ class Knowledge:
         for name in names:
             self.memories.pop(name, None)
             if name in self.searches:
-                self.searches[name] = search_of(self._prepared, name)
+                self.searches[name] = chooser(self._prepared, name)
 
     def facts(self) -> dict[str, Any]:
         """The knowledge, for the manifest."""

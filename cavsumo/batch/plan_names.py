@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from cavsumo.agents.names import AGENT_NAMES, declared_parameters, policy_file
+from cavsumo.agents.names import AGENT_NAMES, SEARCH, declared_parameters, policy_file
 from cavsumo.assertions.formulas.rules import rule
 from cavsumo.assertions.names import ASSERTION_NAMES, is_formula
 from cavsumo.egos.names import check_ego
@@ -12,6 +12,11 @@ from cavsumo.model.bodies import kind_named
 from cavsumo.model.names import check_shared
 from cavsumo.model.objects import is_object
 from cavsumo.model.scenario import NO_REFERENCE, BatchPlan, Scenario
+
+
+def searching(plan: BatchPlan) -> frozenset[str]:
+    """The labels of the agents that search."""
+    return frozenset(label for label, name in plan.cast.items() if name == SEARCH)
 
 
 def check_names(plan: BatchPlan) -> None:

@@ -94,6 +94,7 @@ def _play(
         sequential=looks_at_rows(prepared.plan),
         cut_short=batch_run.cut_short or batch_run.status == "interrupted",
         searches=batch_run.searches,
+        estimates=batch_run.estimates,
         promises={member.label: member.promise for member in prepared.cast},
     )
 

@@ -16,7 +16,7 @@ import numpy as np
 
 from cavsumo.agents.casting import Cast, resolve_cast, teams
 from cavsumo.agents.manoeuvres import types_for
-from cavsumo.agents.names import SEARCH_METHODS
+from cavsumo.agents.names import EXPOSURE, SEARCH, SEARCH_METHODS
 from cavsumo.assertions.specs import assertions_of
 from cavsumo.batch.plan_names import check_names
 from cavsumo.egos.base import Ego
@@ -33,6 +33,9 @@ from cavsumo.network.site import Site, Wishes
 from cavsumo.network.site_cache import site_of
 from cavsumo.network.traffic import Volume
 from cavsumo.network.traffic_lights import Pace
+from cavsumo.probability.encounters import encounters_of
+from cavsumo.probability.exposure import exposure_of
+from cavsumo.probability.methods import check_episodes
 from cavsumo.results.present import input_files
 from cavsumo.results.provenance import checksums, traffic_checksum, unequal, versions
 from cavsumo.searchers.continued import SPACE, fingerprint
@@ -188,11 +191,13 @@ def _prepared(plan: BatchPlan, ego: Ego | None) -> PreparedBatch:
             "needs a controller, such as time-gap"
         )
     site = _site(plan, kind, ego, cast)
+    _check_exposures(site, kind, plan, cast)
     objects = objects_among([*plan.cast.values(), scenario.ego, *scenario.assertions])
     where = str(Path.cwd()), _checksums(plan, cast), versions()
     prepared = PreparedBatch(plan, cast, site, *where, objects=objects)
-    for label in sorted(cast.searchers):  # a space without a start is refused too
-        check_method(str(cast[label].params.get("method", SEARCH_METHODS[0])), prepared.space)
+    for member in cast:
+        if member.name == SEARCH:  # a space without a start is refused too
+            check_method(str(member.params.get("method", SEARCH_METHODS[0])), prepared.space)
     return prepared
 
 
@@ -263,6 +268,15 @@ def wishes(plan: BatchPlan, kind: Kind, ego: Ego, manoeuvres: Set[str]) -> Wishe
         signal=scenario.signal,
         pace=Pace(ego.depart_speed, top_speed(ego)),
     )
+
+
+def _check_exposures(site: Site, kind: Kind, plan: BatchPlan, cast: Cast) -> None:
+    """Refuse exposures that cannot be read, or that have no support at the site."""
+    for member in cast:
+        if member.name == EXPOSURE:
+            exposure = exposure_of(member.params)
+            check_episodes(str(member.params.get("method")), plan.runs)
+            encounters_of(site, kind, teams(plan.scenario), exposure)
 
 
 def _check_kind(scenario: Scenario, kind: Kind, cast: Cast) -> None:

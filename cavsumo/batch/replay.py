@@ -9,10 +9,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, NamedTuple
 
+from cavsumo.batch.choosers import chosen
 from cavsumo.batch.jobs import Job, Memory, job
 from cavsumo.batch.messages import Answer
 from cavsumo.batch.prepared import PreparedBatch, prepare
-from cavsumo.batch.searches import searched
 from cavsumo.batch.trust import check_trust
 from cavsumo.batch.worker import Worker
 from cavsumo.errors import DivergenceError, ResultsError, shown
@@ -178,12 +178,12 @@ def _played_again(worker: Worker, record: Record) -> Answer:
 def known(worker: Worker, record: Record) -> Memory | None:
     """The knowledge of an episode's agents before it.
 
-    A learner plays its earlier episodes; the point of a search follows from their rows.
+    A learner plays its earlier episodes; that of a search or an estimate follows from their rows.
     """
     plan, run = worker.prepared.plan, record.run
     step, label, memory = len(plan.agents), record.row["agent"], job(plan, run).memory
     if label in worker.prepared.cast.searchers:
-        return searched(worker.prepared, label, rows_of(record.file), run)
+        return chosen(worker.prepared, label, rows_of(record.file), run)
     learns = label in worker.prepared.cast.learners
     for earlier in range(run % step, run, step) if learns else ():
         memory = worker.play(job(plan, earlier, memory)).memory

@@ -8,7 +8,6 @@ from typing import Any
 
 from cavsumo.agents.casting import params_of
 from cavsumo.agents.names import SEARCH, SEARCH_METHODS
-from cavsumo.batch.jobs import Memory
 from cavsumo.batch.prepared import PreparedBatch
 from cavsumo.batch.searching import Searching, SearchOrder
 from cavsumo.errors import ResultsError
@@ -33,20 +32,6 @@ def check_earlier(prepared: PreparedBatch) -> None:
     for member in prepared.cast:
         if member.searches and member.params.get("earlier"):
             search_of(prepared, member.label)
-
-
-def searched(
-    prepared: PreparedBatch, label: str, rows: Iterable[Mapping[str, Any]], run: int
-) -> Memory:
-    """The memories with which the agents of a search played an episode, from the rows before it.
-
-    Raises ResultsError where rows are missing.
-    """
-    search = search_of(prepared, label)
-    _tell(search, (row for row in rows if int(row["run"]) < run))
-    if not search.ready(run):
-        raise ResultsError(f"run {run} cannot be found again: rows of the search before it miss")
-    return search.memory(run)
 
 
 def _search(

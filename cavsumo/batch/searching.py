@@ -17,6 +17,7 @@ import numpy as np
 
 from cavsumo.agents.decisions import read
 from cavsumo.batch.jobs import Memory
+from cavsumo.results.alike import FEATURES, kind_of
 from cavsumo.results.grade import INVALID_GRADE
 from cavsumo.results.rows import cell
 from cavsumo.searchers.continued import ContinuedSearch
@@ -25,8 +26,7 @@ from cavsumo.searchers.protocol import PlayedPoint, PointSpace
 from cavsumo.searchers.space import Point, Space
 from cavsumo.searchers.words import Failure, in_common
 
-TOLD = ("grade", "outcome", "avoidable", "tester", "situations")  # columns
-SPEED_BIN_MPS, PLACE_BIN_M = 2.0, 10.0  # failures within a bin are alike
+TOLD = ("grade", "outcome", "avoidable", "tester", "situations", *FEATURES)  # columns
 
 
 @dataclass(frozen=True)
@@ -115,7 +115,7 @@ class Searching:
         run = int(row["run"])
         if self.ready(run):
             number = self._number(run)
-            self._told[number] = self._result(number, row)
+            self._told[number] = self._result(row)
             self._testers[number] = _body(cell(row["tester"]))
             self._lasted[number] = float(cell(row["time_s"]) or 0.0)
 
@@ -161,25 +161,20 @@ class Searching:
         if self.searcher.uniform:
             self._uniform.update(self._generation)
 
-    def _result(self, number: int, row: Mapping[str, Any]) -> PlayedPoint:
+    def _result(self, row: Mapping[str, Any]) -> PlayedPoint:
         """The result of a point; a row of this session and one that was recorded tell the same."""
         text = {key: cell(row[key]) for key in TOLD}
         grade = float(text["grade"]) if text["grade"] else INVALID_GRADE
         failed = text["outcome"] == "violated" and text["avoidable"] != "0" and grade >= 0.0
-        kind = self._kind(number, _body(text["tester"]), grade) if failed else ()
+        kind = kind_of(text) if failed else ()
         return PlayedPoint(grade, failed, kind, tuple(read(text["situations"])))
 
     def _failure(self, number: int) -> Failure:
         """The body that the ego failed in an episode."""
-        bodies, body = self.spaces[number].played(self.points[number]), self._testers[number]
-        place, programme = bodies[body]
-        others = sum(one is not None for _, one in bodies) - (programme is not None)
+        played = self.spaces[number].played(self.points[number])
+        place, programme = played[self._testers[number]]
+        others = sum(one is not None for _, one in played) - (programme is not None)
         return Failure(place, programme, others)
-
-    def _kind(self, number: int, body: int, impact: float) -> tuple[object, ...]:
-        """Impact speed, side and place of a failure, by which failures are alike."""
-        place = self.spaces[number].place(self.points[number], body)
-        return impact // SPEED_BIN_MPS, place.whence, place.along // PLACE_BIN_M
 
 
 def _body(tester: str) -> int:

@@ -90,15 +90,16 @@ class Found:
 
     def _count_drives(self, columns: Columns, valid: Sequence[bool]) -> None:
         """Count how the ego came along in valid episodes."""
-        arrived, lost, frozen = (
-            list(filter(None, map(cell, compress(columns[name], valid)))) for name in DRIVES
-        )
-        for said, count in Counter(arrived).items():
-            self.arrivals[float(said) == 1.0] += count
-        for seconds in map(float, lost):  # in the order of the rows: sums of floats depend on it
-            self.lost_s += seconds
-        self.compared += len(lost)
-        self.frozen.update(frozen)
+        arrived, lost, frozen = (compress(columns[name], valid) for name in DRIVES)
+        for value, count in Counter(arrived).items():
+            if said := cell(value):
+                self.arrivals[float(said) == 1.0] += count
+        for text in filter(None, map(cell, lost)):
+            self.lost_s += float(text)  # in the order of the rows: sums of floats depend on it
+            self.compared += 1
+        for value, count in Counter(frozen).items():
+            if said := cell(value):
+                self.frozen[said] += count
 
     @property
     def episodes(self) -> int:

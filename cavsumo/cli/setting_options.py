@@ -10,6 +10,7 @@ from typing import Any, get_args, get_origin
 
 from cavsumo.cli.choices import CHOICES
 from cavsumo.errors import InputError
+from cavsumo.model.checks import assignment
 from cavsumo.model.scenario.fields import Setting
 from cavsumo.model.scenario.sensor import Sensor
 
@@ -114,18 +115,3 @@ def named_text(option: str, word: str) -> tuple[str, str]:
     if not (equals and text.strip()):
         raise InputError(f"{option}: expected NAME=TEXT, got {word!r}")
     return name.strip(), text.strip()
-
-
-def assignment(option: str, word: str) -> tuple[str, bool | int | float | str]:
-    """KEY=VALUE as a key and a truth value, a number or a word."""
-    key, equals, value = word.partition("=")
-    if not (key and equals):
-        raise InputError(f"{option}: expected KEY=VALUE, got {word!r}")
-    if value in ("true", "false"):
-        return key, value == "true"
-    for number in (int, float):
-        try:
-            return key, number(value)
-        except ValueError:
-            continue
-    return key, value

@@ -12,6 +12,7 @@ EGO_NAMES = Names(
     "cavsumo.egos",
     {
         "constant": "constant",
+        "crosswalk": "crosswalk",
         "sumo": "sumo",
         "sumo:ACC": "sumo_models",
         "sumo:CACC": "sumo_models",
@@ -22,6 +23,7 @@ EGO_NAMES = Names(
     },
     {
         "constant": "speed",
+        "crosswalk": "",
         "sumo": "carFollowModel reaction_s",  # and attributes of a vType, as those below
         "sumo:ACC": "reaction_s",
         "sumo:CACC": "reaction_s",

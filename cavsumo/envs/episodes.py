@@ -16,6 +16,7 @@ from cavsumo.envs.commanded import CommandedAgent, CommandedEgo
 from cavsumo.envs.ego_observations import EgoObserver
 from cavsumo.envs.ego_rewards import EgoRewardMonitor
 from cavsumo.envs.events import EventDetector
+from cavsumo.envs.grading import final_grade
 from cavsumo.envs.settings import Roles
 from cavsumo.envs.spaces import Vector
 from cavsumo.errors import SimulationError, SimulationTaken
@@ -65,13 +66,13 @@ class Episodes:
         assert self._setup is not None
         self._loop = None
         setup = self._setup
-        loop = EpisodeLoop(setup, self._agents, seed)
+        loop = EpisodeLoop(setup, self._agents, seed, keep=self._roles.reward == "grade")
         scene = loop.scene
         self._observers = [TeamObserver(scene, team) for team in setup.teams if self._commanded]
         self._ego_observer = EgoObserver(scene)
         self._rewards = EgoRewardMonitor(scene, loop.snapshot, steers=self._steers)
         self._watch = EventDetector(loop, setup.assertions)
-        self._loop, self._game_over, self._left = loop, False, False
+        self._loop, self._game_over, self._left, self._seed = loop, False, False, seed
         info = self._watch.info() | {"seed": seed}
         return Seen(self._observations(), {}, False, False, info)
 
@@ -95,6 +96,8 @@ class Episodes:
         info = self._watch.info()
         if any(ended):
             info["summary"] = self._watch.summary()
+            if self._roles.reward == "grade":
+                rewards |= dict.fromkeys(self._teams, self._graded(loop, setup))
             self._loop = None
         return Seen(self._observations(), rewards, *ended, info)
 
@@ -150,8 +153,9 @@ class Episodes:
         self._left = loop.snapshot is before
         if feedback is not None:
             self._game_over = feedback[1]
-            for name, reward in zip(self._teams, feedback[0], strict=False):
-                rewards[name] += reward
+            if self._roles.reward == "game":
+                for name, reward in zip(self._teams, feedback[0], strict=False):
+                    rewards[name] += reward
         if self._commanded_ego is not None:
             successor = None if self._left else loop.snapshot
             judgements = [a.judgement for a in self._setup.assertions]
@@ -168,6 +172,10 @@ class Episodes:
             return False, False
         decided = self._left or all(a.decided for a in setup.assertions)
         return decided, not decided
+
+    def _graded(self, loop: EpisodeLoop, setup: Setup) -> float:
+        """The grade of the episode that has ended."""
+        return final_grade(loop, setup, self._agents, self._seed, self._prepared.plan.reference)
 
     def _observations(self) -> dict[str, Vector]:
         """The observation of each role."""

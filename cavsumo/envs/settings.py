@@ -19,6 +19,7 @@ from cavsumo.model.scenario.fields import settings as offered
 from cavsumo.model.scenario_file import read_config
 
 UNTIL = ("game", "verdict")
+REWARDS = ("game", "grade")
 PROCESSES = ("this", "own")
 KEYS = frozenset(s.key for s in offered() if s.environments)  # keywords of the environments
 
@@ -34,6 +35,7 @@ class Roles:
             "verdict": when the assertions have decided, as in ``cavsumo run``.
         hold: for how many timesteps an action lasts.
         actions: form of the testers' actions: "effectors" or "targets".
+        reward: of the testers: "game", or "grade" at the end of an episode and nothing before.
         drawn: whether pictures are made, for which the whole background is read.
     """
 
@@ -42,6 +44,7 @@ class Roles:
     until: str = "game"
     hold: int = 1
     actions: str = "effectors"
+    reward: str = "game"
     drawn: bool = False
     named: str = field(default="cavsumo", compare=False)  # the name of the environment in messages
 
@@ -50,6 +53,9 @@ class Roles:
             choice("until", self.until, UNTIL)
             whole("hold", self.hold, 1)
             choice("actions", self.actions, ACTIONS)
+            choice("reward", self.reward, REWARDS)
+            if self.reward == "grade" and self.until != "verdict":
+                raise ValueError("reward 'grade' needs until='verdict'")
         except ValueError as error:
             raise InputError(f"{self.named}: {error}") from error
 
@@ -74,7 +80,7 @@ def prepared_for(
     source = roles.named
     for key in given:
         if key not in KEYS:
-            raise UnknownName("keyword", key, KEYS | {"config", "hold", "until"}, source)
+            raise UnknownName("keyword", key, KEYS | {"config", "hold", "reward", "until"}, source)
     file = read_config(Path(config)) if config is not None else {}
     settings = {k: v for k, v in (file | dict(given)).items() if k in KEYS}
     if settings.get("net") is None:

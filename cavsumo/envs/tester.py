@@ -25,6 +25,8 @@ class TesterEnv(OneLearner):
             "verdict": it goes on, for no more reward, until the verdict, as in ``cavsumo run``.
         actions: "effectors": throttle and steering of each body in [-1, 1]; "targets": for each
             body to stand, or where to walk, as Q-learning's (pedestrians only).
+        reward: "game": that of the testers' game; "grade": how near the episode came to a
+            preventable failure, at its end (needs until="verdict").
         hold: for how many timesteps an action lasts; rewards are summed.
         process: "this", or "own" for a simulation in a process of its own.
         render_mode: "rgb_array" or None.
@@ -38,6 +40,7 @@ class TesterEnv(OneLearner):
         config: str | Path | None = None,
         until: str = "game",
         actions: str = "effectors",
+        reward: str = "game",
         hold: int = 1,
         process: str = "this",
         render_mode: str | None = None,
@@ -45,7 +48,8 @@ class TesterEnv(OneLearner):
     ) -> None:
         named = "cavsumo/Tester-v0"
         drawn = render_mode is not None
-        roles = Roles(until=until, hold=hold, actions=actions, drawn=drawn, named=named)
+        how: dict[str, Any] = {"until": until, "actions": actions, "reward": reward}
+        roles = Roles(hold=hold, drawn=drawn, named=named, **how)
         prepared = prepared_for(roles, config, settings, one_team=True)
         bodies = tester_bodies(prepared.plan.scenario)
         (team,) = teams(prepared.plan.scenario)

@@ -81,6 +81,11 @@ class Arena:
         """The state of each cell."""
         return self.group_state[self.cell_group]
 
+    @cached_property
+    def scale(self) -> float:
+        """The size of rewards."""
+        return max(float(self.reward.max(initial=0.0)), -float(self.reward.min(initial=0.0))) or 1.0
+
     def advantages(self, value: Floats) -> Floats:
         """r + sum of p V(s') - V(s) of every cell."""
         parts = (self.cell_outcome, self.successor, self.probability, self.reward, self.cell_state)

@@ -173,13 +173,8 @@ def _start(play: Play) -> Floats:
         play.sweep(value, none)
     _, pair = play.backup(value)
     proper = made_proper(play, pair, value)
-    jump = value_of(play, proper, value, none, 0.1 * _scale(play), precise=False)
+    jump = value_of(play, proper, value, none, 0.1 * play.arena.scale, precise=False)
     return value if jump is None else jump
-
-
-def _scale(play: Play) -> float:
-    """The size of rewards."""
-    return float(np.abs(play.arena.reward).max(initial=0.0)) or 1.0
 
 
 def _certified(
@@ -187,7 +182,7 @@ def _certified(
 ) -> Certificate:
     """Proven bounds, within the required precision if floats allow it."""
     none = np.zeros_like(value)
-    scale = _scale(play)
+    scale = play.arena.scale
     value, pair, left = approach(play, value, none, 1e-4 * scale, "the value", tell)
     expected = time_of(play, made_proper(play, pair, value))
     steps = np.append(np.ones(play.arena.size), 0.0) if expected is None else expected

@@ -5,6 +5,8 @@ from __future__ import annotations
 import math
 from typing import Any
 
+from cavsumo.errors import InputError
+
 
 def number(name: str, value: Any, low: float = -math.inf, high: float = math.inf) -> float:
     """A finite number within [low, high], or ValueError naming what was expected."""
@@ -47,3 +49,18 @@ def densities(value: Any) -> tuple[float, float]:
     if len(found) not in (1, 2) or not all(0.0 <= number <= 100.0 for number in found):
         raise ValueError("must be a number from 0 to 100, or two for cars and pedestrians")
     return found[0], found[-1]
+
+
+def assignment(option: str, word: str) -> tuple[str, bool | int | float | str]:
+    """KEY=VALUE as a key and a truth value, a number or a word."""
+    key, equals, value = word.partition("=")
+    if not (key and equals):
+        raise InputError(f"{option}: expected KEY=VALUE, got {word!r}")
+    if value in ("true", "false"):
+        return key, value == "true"
+    for numeric in (int, float):
+        try:
+            return key, numeric(value)
+        except ValueError:
+            continue
+    return key, value

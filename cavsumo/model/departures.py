@@ -45,6 +45,15 @@ class Walk(NamedTuple):
     stages: tuple[Stage, ...]
 
 
+class Entry(NamedTuple):
+    """Another entry of the ego than that of its route."""
+
+    edge: int  # which edge of its route it enters on
+    lane: int
+    along: float  # place of its front bumper on the lane [m]
+    speed: float  # m/s
+
+
 @dataclass(frozen=True)
 class Demand:
     """Departures in the order of their times.
@@ -53,8 +62,10 @@ class Demand:
         trips, walks: of vehicles and of persons.
         types: attributes of their vehicle types, by id; without those that SUMO knows by itself or
             from additional files.
+        ego: where and how fast the ego enters, if not at the beginning of its route.
     """
 
     trips: tuple[Trip, ...] = ()
     walks: tuple[Walk, ...] = ()
     types: Mapping[str, Attributes] = field(default_factory=dict)
+    ego: Entry | None = None

@@ -10,6 +10,8 @@ without delay. It has *measurements* of the other bodies. The measurement of a t
   speed that is not negative stays so, orientations are wrapped;
 * the traffic lights whose stop lines are within ``range_m``, without occlusion and errors.
 
+* A body of a script with ``errors_m`` has these added, for the ego alone.
+
 At the time t the observer receives the measurement of t - ``delay_s``, rounded to timesteps; at
 the start of an episode, when there is none so old, the first.
 """
@@ -27,7 +29,9 @@ from cavsumo.model.bodies import BICYCLE, PEDESTRIAN
 from cavsumo.model.geometry import Point
 from cavsumo.model.kinematics import wrap
 from cavsumo.model.occlusion import in_sight
+from cavsumo.model.scenario.script import ScriptedTest
 from cavsumo.model.scenario.sensor import Sensor
+from cavsumo.model.scenario.track import Place
 from cavsumo.model.scene import Scene
 from cavsumo.model.snapshot import BodyState, RawState, Snapshot
 
@@ -59,6 +63,7 @@ class Observer:
         self._sensor, self._own, self._rng = sensor, own, rng
         self._range = math.inf if sensor.range_m is None else sensor.range_m
         self._noise = np.array(sensor.noise) if any(sensor.noise) else None
+        self._errors = {} if own is not None else scripted_errors(scene.script)
         self._past: deque[Measurement] = deque(maxlen=1 + round(sensor.delay_s / scene.dt))
         self._lights = [scene.ego_path.at(light.along)[:2] for light in scene.lights]
         # Where a tester agent takes bodies to be before it has seen them.
@@ -115,6 +120,9 @@ class Observer:
         ids = {state.id for state in mine}
         others = [other for other in (ego, *testers, *background) if other[0].id not in ids]
         found = {state[0].id: state for state in self._look(eyes, others)}
+        for name, errors in self._errors.items():
+            if name in found and snapshot.step < len(errors):
+                found[name] = _shifted(found[name], *errors[snapshot.step], 0.0, 0.0)
         known = [found.get(state.id) for state in (ego, *testers)]
         first, *rest = [state and BodyState._make(state) for state in known]
         return Measurement(
@@ -164,6 +172,12 @@ class Observer:
             letter if min(math.dist(eye, light) for eye in eyes) <= self._range else ""
             for letter, light in zip(letters, self._lights, strict=True)
         )
+
+
+def scripted_errors(script: ScriptedTest | None) -> dict[str, tuple[Place, ...]]:
+    """The errors with which a script has the ego measure its testers, by their ids."""
+    bodies = zip(script.bodies, script.testers, strict=True) if script else ()
+    return {body.id: tester.errors_m for body, tester in bodies if tester.errors_m}
 
 
 class Senses:

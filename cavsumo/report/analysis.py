@@ -11,6 +11,7 @@ from cavsumo.report.distinct import Distinct, FailureCell, distinct, failure_cel
 from cavsumo.report.driving import EgoDriving, driving
 from cavsumo.report.effort import Effort, effort
 from cavsumo.report.events import Described, described
+from cavsumo.report.explored import Explored, explored
 from cavsumo.report.grouping import Group, grouped
 from cavsumo.report.load import Evidence, load
 from cavsumo.report.rates import Rates, rates
@@ -30,6 +31,7 @@ class Report:
         comparisons: groups in pairs, on the same seeds.
         tests: what the traces tell of each test, by the index of its row.
         failures: failures that are alike, those that were preventable most often first.
+        explored: what the searching agents among the groups have explored.
     """
 
     by: str
@@ -44,6 +46,7 @@ class Report:
     distinct: Sequence[Distinct]
     tests: Mapping[int, Described]
     failures: Sequence[FailureCell]
+    explored: Sequence[Explored]
 
 
 def analyse(files: Sequence[Path], by: str = "agent") -> Report:
@@ -64,4 +67,5 @@ def analyse(files: Sequence[Path], by: str = "agent") -> Report:
         [distinct(group, tests, evidence.batches) for group in groups],
         tests,
         failure_cells(groups, tests, evidence.batches),
+        [one for group in groups if (one := explored(group, evidence.batches))],
     )

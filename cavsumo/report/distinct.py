@@ -7,7 +7,6 @@ Scand. J. Stat. 11, 265).
 
 from __future__ import annotations
 
-import math
 from collections import Counter
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
@@ -16,10 +15,10 @@ from typing import NamedTuple
 from cavsumo.report.events import Described, Event
 from cavsumo.report.grouping import Group, Told
 from cavsumo.report.load import Batch
+from cavsumo.results.alike import PLACE_BIN_M, SPEED_BIN_MPS, bin_of
 from cavsumo.results.failures import ORDER, failure_kind
 
 JUDGED = ("outcome", "avoidable")  # columns that say whether a failure was preventable
-SPEED_BIN, PLACE_BIN = 2.0, 10.0  # m/s, m
 
 
 class Cell(NamedTuple):
@@ -96,13 +95,8 @@ def cell_of(event: Event, kind: str, setting: str) -> Cell | None:
     """The cell of an event, None when anything of it is not known."""
     if event.speed is None or event.side is None or event.place is None:
         return None
-    speed, place = _floor(event.speed, SPEED_BIN), _floor(event.place, PLACE_BIN)
+    speed, place = bin_of(event.speed, SPEED_BIN_MPS), bin_of(event.place, PLACE_BIN_M)
     return Cell(setting, kind, event.side, speed, place)
-
-
-def _floor(value: float, width: float) -> float:
-    """The lower bound of the bin that a value lies in."""
-    return math.floor(value / width + 1e-9) * width
 
 
 def distinct(group: Group, tests: Mapping[int, Described], batches: tuple[Batch, ...]) -> Distinct:

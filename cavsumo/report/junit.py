@@ -38,14 +38,19 @@ def junit(evidence: Evidence) -> str:
     for index, batch in enumerate(evidence.batches):
         rows = evidence.rows[evidence.rows["batch"] == index]
         root.append(_suite(batch, rows))
-    _count(root, root.iter("testcase"))
+    totals(root, root.iter("testcase"))
+    return document(root)
+
+
+def document(root: ET.Element) -> str:
+    """The text of a document."""
     ET.indent(root, " ")
     return '<?xml version="1.0" encoding="UTF-8"?>\n' + ET.tostring(root, "unicode") + "\n"
 
 
 def _suite(batch: Batch, rows: pandas.DataFrame) -> ET.Element:
     """One results file."""
-    suite = ET.Element("testsuite", name=_legal(str(batch.csv_file)))
+    suite = ET.Element("testsuite", name=legal(str(batch.csv_file)))
     properties = ET.SubElement(suite, "properties")
     cases = []
     for agent in batch.plan.cast:
@@ -59,7 +64,7 @@ def _suite(batch: Batch, rows: pandas.DataFrame) -> ET.Element:
         cases += _standing(agent, driving(group))
         cases += _errors(agent, own)
     suite.extend(cases)
-    _count(suite, cases)
+    totals(suite, cases)
     return suite
 
 
@@ -77,23 +82,23 @@ def _properties(parent: ET.Element, agent: str, found: Rates) -> None:
         text = f"{share.count} of {share.total} {share.of}"
         if share.total:
             text += f", {percent(share.value)}, 95 % interval by {spans}"
-        ET.SubElement(parent, "property", name=_legal(f"{agent}.{what}"), value=text)
+        ET.SubElement(parent, "property", name=legal(f"{agent}.{what}"), value=text)
     if found.invalid:
         text = f"{found.invalid} of {found.episodes} episodes"
-        ET.SubElement(parent, "property", name=_legal(f"{agent}.invalid"), value=text)
+        ET.SubElement(parent, "property", name=legal(f"{agent}.invalid"), value=text)
 
 
 def _case(batch: Batch, agent: str, assertion: str, rows: pandas.DataFrame) -> ET.Element:
     """One agent and assertion: failed, held, or never tested."""
     said = _verdicts(rows, assertion)
     tests, failures = rows[said.isin(("held", "violated"))], rows[said == "violated"]
-    case = ET.Element("testcase", classname=_legal(agent), name=assertion)
+    case = ET.Element("testcase", classname=legal(agent), name=assertion)
     case.set("time", f"{rows['wall_s'].sum():.3f}")
     if len(failures):
         ordered = preventable_first(_own(row, assertion) for row in failures.to_dict("records"))
         told = [_replay(batch, row, assertion) for row in ordered[:SHOWN]]
         message = f"{_failed(batch, ordered, len(tests))}; first: {told[0]}"
-        _add(case, "failure", message, _with_rest(told, len(failures)), assertion)
+        result(case, "failure", message, _with_rest(told, len(failures)), assertion)
     elif not len(tests):
         valid = int((~rows["outcome"].isin(("error", "invalid"))).sum())
         message = f"no test of it in {valid} valid episodes: nothing is known"
@@ -104,16 +109,16 @@ def _case(batch: Batch, agent: str, assertion: str, rows: pandas.DataFrame) -> E
 def _suite_case(batch: Batch, row: Mapping[Any, Any]) -> ET.Element:
     """One case of a suite: avoided, failed, not played, or left out because a tester failed."""
     test, name = row["case"].partition("/")[0], row["case"]
-    case = ET.Element("testcase", classname=_legal(test), name=_legal(name))
+    case = ET.Element("testcase", classname=legal(test), name=legal(name))
     case.set("time", f"{row['wall_s']:.3f}")
     if row["outcome"] == VIOLATED:
         told = _replay(batch, row, row["assertion"])
-        _add(case, "failure", told, told, row["assertion"])
+        result(case, "failure", told, told, row["assertion"])
     elif row["outcome"] == "error":
-        _add(case, "error", row["error"], row["error"], "error")
+        result(case, "error", row["error"], row["error"], "error")
     elif row["outcome"] != HELD:
         message = f"run {row['run']}: {row['outcome']} {row['breach']}".strip()
-        ET.SubElement(case, "skipped", message=_legal(message))
+        ET.SubElement(case, "skipped", message=legal(message))
     return case
 
 
@@ -159,8 +164,8 @@ def _standing(agent: str, found: EgoDriving) -> list[ET.Element]:
     """A case of its own for an ego that stood still or crawled, which no failure shows."""
     if not found.warning:
         return []
-    case = ET.Element("testcase", classname=_legal(agent), name="the ego drives")
-    ET.SubElement(case, "skipped", message=_legal(found.warning))
+    case = ET.Element("testcase", classname=legal(agent), name="the ego drives")
+    ET.SubElement(case, "skipped", message=legal(found.warning))
     return [case]
 
 
@@ -169,10 +174,10 @@ def _errors(agent: str, rows: pandas.DataFrame) -> list[ET.Element]:
     errors = rows[rows["outcome"] == "error"]
     if not len(errors):
         return []
-    case = ET.Element("testcase", classname=_legal(agent), name="episodes can be played")
+    case = ET.Element("testcase", classname=legal(agent), name="episodes can be played")
     told = [f"run {row['run']}: {row['error']}" for row in errors.head(SHOWN).to_dict("records")]
     message = f"{len(errors)} of {len(rows)} episodes could not be played; first: {told[0]}"
-    _add(case, "error", message, _with_rest(told, len(errors)), "error")
+    result(case, "error", message, _with_rest(told, len(errors)), "error")
     return [case]
 
 
@@ -182,12 +187,12 @@ def _with_rest(told: Sequence[str], total: int) -> str:
     return "\n".join([*told, *([f"and {rest} more"] if rest else [])])
 
 
-def _add(case: ET.Element, tag: str, message: str, text: str, sort: str) -> None:
+def result(case: ET.Element, tag: str, message: str, text: str, sort: str) -> None:
     """The result of a case."""
-    ET.SubElement(case, tag, message=_legal(message), type=_legal(sort)).text = _legal(text)
+    ET.SubElement(case, tag, message=legal(message), type=legal(sort)).text = legal(text)
 
 
-def _count(parent: ET.Element, cases: Any) -> None:
+def totals(parent: ET.Element, cases: Any) -> None:
     """The attributes that add cases up."""
     cases = list(cases)
     parent.set("tests", str(len(cases)))
@@ -196,6 +201,6 @@ def _count(parent: ET.Element, cases: Any) -> None:
     parent.set("time", f"{sum(float(case.get('time', 0)) for case in cases):.3f}")
 
 
-def _legal(text: str) -> str:
+def legal(text: str) -> str:
     """Text without characters that XML cannot hold."""
     return ILLEGAL.sub("�", text)

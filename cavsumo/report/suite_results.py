@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -109,13 +109,16 @@ class SuiteTestResult:
 
 @dataclass(frozen=True)
 class SuiteTold:
-    """The words of a page about a suite: titles, the ego, the results file, the tests' titles."""
+    """The words of a page about a suite: titles, the ego, the results file, the tests' titles, and
+    the parameters in the names of their cases.
+    """
 
     title: str
     source: str
     ego: str
     file: str
     tests: dict[str, str]
+    named_by: dict[str, tuple[str, ...]] = field(default_factory=dict)
 
 
 def told_of(file: Path) -> SuiteTold:
@@ -123,7 +126,8 @@ def told_of(file: Path) -> SuiteTold:
     plan, _ = recorded_plan(file)
     suite = cases_of(plan).suite
     titles = {test.name: test.title for test in suite.tests}
-    return SuiteTold(suite.title, suite.source, plan.scenario.ego, file.name, titles)
+    named_by = {test.name: test.case for test in suite.tests}
+    return SuiteTold(suite.title, suite.source, plan.scenario.ego, file.name, titles, named_by)
 
 
 def cases_in(file: Path) -> list[CaseResult]:

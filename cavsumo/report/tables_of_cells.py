@@ -6,7 +6,8 @@ from cavsumo.batch.sentences import many
 from cavsumo.batch.summary import percent
 from cavsumo.report.analysis import Report
 from cavsumo.report.cells import Labels, Table
-from cavsumo.report.distinct import PLACE_BIN, SPEED_BIN, Diversity
+from cavsumo.report.distinct import Diversity
+from cavsumo.results.alike import PLACE_BIN_M, SPEED_BIN_MPS
 
 SHOWN = 10  # cells of failures
 
@@ -20,9 +21,9 @@ def distinct_table(report: Report, labels: Labels) -> Table:
             rows.append([*labels.cells(one), what, *_diversity_cells(diversity)])
     numbers = ("count", "cell known", "distinct", "estimated", "next is new")
     notes = [
-        f"A cell: closing speed in steps of {SPEED_BIN:g} m/s, side of the ego, its way so far in "
-        f"steps of {PLACE_BIN:g} m, kind of tester; of tests at the trigger, of failures at the "
-        "impact.",
+        f"A cell: closing speed in steps of {SPEED_BIN_MPS:g} m/s, side of the ego, its way so far "
+        f"in steps of {PLACE_BIN_M:g} m, kind of tester; of tests at the trigger, of failures at "
+        "the impact.",
         "Estimated: all cells there are, met or not, at least (Chao); next is new: by Good and "
         "Turing.",
     ]
@@ -51,8 +52,8 @@ def failures_table(report: Report) -> Table:
     for one in found[:SHOWN]:
         cell = one.cell
         run = f"{one.file} {one.run}" if several else str(one.run)
-        speed = f"{cell.speed:g} to {cell.speed + SPEED_BIN:g}"
-        place = f"{cell.place:g} to {cell.place + PLACE_BIN:g}"
+        speed = f"{cell.speed:g} to {cell.speed + SPEED_BIN_MPS:g}"
+        place = f"{cell.place:g} to {cell.place + PLACE_BIN_M:g}"
         words = [cell.kind, cell.side, ", ".join(one.agents)]
         words = [cell.setting, *words] if settings else words
         counts = (one.preventable, one.count - one.preventable) if judged else (one.count,)

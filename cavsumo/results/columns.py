@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from cavsumo.simulation.avoidability import Avoidability
     from cavsumo.simulation.ego_progress import EgoProgress
     from cavsumo.simulation.episode import Episode
+    from cavsumo.simulation.tester_course import TesterCourse
 
 Row = dict[str, Any]
 
@@ -102,6 +103,11 @@ def _with_ego(episode: Episode) -> int:
 def _driven(value: Callable[[EgoProgress], Any]) -> Measured:
     """A value of the ego's drive."""
     return Measured(lambda episode: value(episode.progress))
+
+
+def _coming(value: Callable[[TesterCourse], Any]) -> Measured:
+    """A value of the course of the tester that was met."""
+    return Measured(lambda e: None if e.course is None else value(e.course))
 
 
 def _retried(value: Callable[[Avoidability], Any]) -> Callable[[FinishedEpisode], Any]:
@@ -229,6 +235,30 @@ _ALL = (
     ),
     Column(
         "tester", "the tester's body involved", "", _judged(lambda said: said.tester), words=True
+    ),
+    Column(
+        "from_side",
+        "from which side of the ego's path that tester came, left, right or ahead; without one, "
+        "the tester that came nearest",
+        "",
+        _coming(lambda course: course.side),
+        words=True,
+        since="0.2",
+    ),
+    Column(
+        "meets_m",
+        "where on the ego's path its way across meets it; of a vehicle, beside which place it "
+        "started",
+        "m",
+        _coming(lambda course: course.meets),
+        since="0.2",
+    ),
+    Column(
+        "tester_speed_mps",
+        "its mean speed while it moved on the road",
+        "m/s",
+        _coming(lambda course: course.speed),
+        since="0.2",
     ),
     Column(
         "trigger_time_s",

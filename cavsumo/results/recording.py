@@ -42,8 +42,14 @@ def recording_head(played: Recorded) -> dict[str, Any]:
         "approaches": played.approaches,
         "starts": played.starts,
         "waited": played.waited,
-        "departures": there and {"types": there.types, "trips": there.trips, "walks": there.walks},
+        "departures": there and _departures(there),
     }
+
+
+def _departures(demand: Demand) -> dict[str, Any]:
+    """Departures as plain data; the ego's entry only where it is another one than its route's."""
+    there = {"types": demand.types, "trips": demand.trips, "walks": demand.walks}
+    return there if demand.ego is None else {**there, "ego": demand.ego}
 
 
 def recording(head: Mapping[str, Any], frames: Sequence[Mapping[str, Any]]) -> Recorded:
@@ -87,6 +93,8 @@ def _check(found: _Parts) -> None:
     for walk in demand.walks:
         if not all(stage.edges for stage in walk.stages):
             raise ResultsError(f"departure of {walk.id!r}: a walk without edges")
+    if demand.ego is not None and min(demand.ego) < 0:
+        raise ResultsError(f"the ego enters at {tuple(demand.ego)}, expected no negative numbers")
     for name, attributes in demand.types.items():
         _check_type(name, attributes)
 

@@ -152,9 +152,9 @@ def states(frame: Mapping[str, Any]) -> Iterator[tuple[str, str, list[float]]]:
             yield part, name, state
 
 
-def trace_text(head: Mapping[str, Any], frames: Iterable[str]) -> str:
-    """A trace as JSON lines, from its head and the lines of its frames."""
-    return "".join([json.dumps(head, allow_nan=False), "\n", *frames])
+def trace_text(head: Mapping[str, Any], frames: str) -> str:
+    """A trace as JSON lines, from its head and the text of its frames."""
+    return f"{json.dumps(head, allow_nan=False)}\n{frames}"
 
 
 def read_trace(file: Path) -> Trace:

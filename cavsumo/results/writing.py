@@ -16,6 +16,7 @@ import json
 import os
 from collections.abc import Iterator, Mapping
 from contextlib import suppress
+from dataclasses import dataclass
 from io import FileIO
 from itertools import chain
 from pathlib import Path
@@ -40,6 +41,23 @@ from cavsumo.results.trace_file import PACKED, PLAIN, trace_name
 RUNNING = "running"
 UNENCODABLE = "backslashreplace"  # file names may contain invalid Unicode
 BESIDE = (PACKED, PLAIN, ".ego.log")  # how the names of an episode's files end
+
+
+@dataclass(frozen=True)
+class Written:
+    """The rows in a results file.
+
+    Attributes:
+        size: the number of bytes, the header included.
+        sum: the SHA-256 of them.
+        last: the number of the last episode, -1 for none.
+        traces: how many rows have a trace.
+    """
+
+    size: int
+    sum: hashlib._Hash
+    last: int
+    traces: int
 
 
 class Recorder:
@@ -115,6 +133,18 @@ class Recorder:
         inside(self.csv_file, self.trace_folder.name)
         if manifest.get("status") != STARTING:
             yield from self._whole_rows(todo)
+        self._go_on(manifest)
+
+    def resume_after(self, manifest: Mapping[str, Any], written: Written) -> None:
+        """Continue after rows that were read and checked already, else like ``resume``."""
+        inside(self.csv_file, self.trace_folder.name)
+        self._size, self._sum, self._last = written.size, written.sum.copy(), written.last
+        self.traces = written.traces
+        self._note(b"")
+        self._go_on(manifest)
+
+    def _go_on(self, manifest: Mapping[str, Any]) -> None:
+        """Be ready for the row behind the existing ones."""
         try:
             self._begun = True
             self.manifest = {k: v for k, v in manifest.items() if k not in _FRAME}

@@ -7,6 +7,8 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import ClassVar
 
+from cavsumo.agents.cues import zone_m
+from cavsumo.agents.driving import BRAKING_MPS2
 from cavsumo.agents.programmed_manoeuvres import DriveProgramme
 from cavsumo.errors import NetworkError
 from cavsumo.model.bodies import Kind
@@ -28,9 +30,10 @@ from cavsumo.searchers.places import (
 LEADS = 16  # places on an approach: how much earlier than the ego a vehicle arrives
 MOST_LEAD_S = 6.0  # one that arrives early waits at its line
 SLOWEST_MPS = 1.0
-# Where an ego that does not react would be as a vehicle comes into its way; one that stops first
-# comes later.
-ZONES, STOPPING_ZONES = (-0.8, 4.0), (-0.8, 6.0)
+# Where an ego that does not react would be as a vehicle meets it: of one that crosses its way, of
+# one that stops in it, of one that first waits for the ego, and of one that is followed by it.
+ZONES, STOPPING_ZONES, WAITING_ZONES = (-0.8, 2.0), (-0.8, 4.0), (-0.8, 6.0)
+FOLLOWED_ZONES = (0.0, 2.0)  # an ego keeps a distance to a vehicle ahead
 DEPTHS_M = (-3.0, 4.0)
 THROUGH = 0.6  # share of the number "depth" from which on a vehicle does not stop
 ONCOMING_RAD, ALONG_RAD = math.radians(135.0), math.radians(45.0)
@@ -67,8 +70,25 @@ class Drives:
     manner: ClassVar[tuple[str, ...]] = ("place", "speed", "depth")
 
     def suited(self, shares: Mapping[str, float]) -> tuple[Place, ...]:
-        """All places: a vehicle that comes too early waits at its line."""
-        return self.places
+        """The places from which the programme of the numbers can be in time; all if none can.
+
+        The vehicle drives up to its line first; the ego is expected to drive at the limit.
+        """
+        return tuple(p for p in self.places if self._in_time(p, shares)) or self.places
+
+    def _in_time(self, place: Place, shares: Mapping[str, float]) -> bool:
+        """Whether the ego is still to come when a vehicle has to begin at its line."""
+        placed, drive = self.realised(place, shares)
+        start, approach = placed.start, placed.start.approach
+        assert approach is not None
+        if not math.isfinite(approach.wait):
+            return True
+        assert not isinstance(drive.cue, str)
+        along = approach.path.project(start.x, start.y).along
+        at_line = (approach.wait - along) / min(self.kind.v_max, approach.speed)
+        v = approach.ego_speed
+        left = approach.ego_enter - zone_m(drive.cue, v)
+        return at_line + _from_line(approach, drive) <= left / v
 
     def realised(self, place: Place, shares: Mapping[str, float]) -> tuple[Place, DriveProgramme]:
         """The place with a start of its own pace, and the programme of the numbers."""
@@ -78,7 +98,8 @@ class Drives:
         start = vehicle_start(
             approach, self.kind, self.ego.length, pace, place.lead, self.start_speed
         )
-        return place._replace(start=start), drive_of(shares, self.kind)
+        crosses = math.isfinite(approach.wait)
+        return place._replace(start=start), drive_of(shares, self.kind, crosses=crosses)
 
     def fits(self, place: Place, others: Sequence[Place]) -> bool:
         """Whether a body can start at a place, apart from the ego and from others."""
@@ -91,12 +112,15 @@ class Drives:
         return Box(start.x, start.y, start.o, self.kind.length, self.kind.width)
 
 
-def drive_of(shares: Mapping[str, float], kind: Kind) -> DriveProgramme:
-    """The programme of the numbers of one body, each in [0, 1]."""
+def drive_of(shares: Mapping[str, float], kind: Kind, *, crosses: bool = True) -> DriveProgramme:
+    """The programme of the numbers of one body, each in [0, 1].
+
+    ``crosses``: it comes across the ego's way or into it, not from ahead or beside.
+    """
     pause, resume = pause_of(shares["resume"])
     depth, speeds = shares["depth"], (SLOWEST_MPS, kind.v_max)
-    return DriveProgramme(
-        cue=within(ZONES if depth >= THROUGH else STOPPING_ZONES, shares["zone"]),
+    programme = DriveProgramme(
+        cue=0.0,
         speed=within(speeds, shares["speed"]),
         effort=shares["effort"],
         depth=None if depth >= THROUGH else within(DEPTHS_M, depth / THROUGH),
@@ -104,6 +128,31 @@ def drive_of(shares: Mapping[str, float], kind: Kind) -> DriveProgramme:
         resume=resume,
         speed_2=within(speeds, shares["speed_2"]),
     )
+    return programme._replace(cue=within(_zones(programme, crosses), shares["zone"]))
+
+
+def _from_line(approach: Approach, drive: DriveProgramme) -> float:
+    """Time from standing at the line until a vehicle comes into the ego's way, roughly [s]."""
+    v, way = min(drive.speed, approach.speed), approach.enter - approach.wait
+    time = way / v + v / (2.0 * drive.gaining)
+    if not drive.hesitates:
+        return time
+    assert drive.depth is not None
+    return (
+        time
+        + v / (2.0 * BRAKING_MPS2)
+        + drive.pause
+        + math.sqrt(-2.0 * drive.depth / drive.gaining)
+    )
+
+
+def _zones(programme: DriveProgramme, crosses: bool) -> tuple[float, float]:
+    """The zones in which a vehicle may begin."""
+    if not crosses:
+        return FOLLOWED_ZONES
+    if programme.depth is None or programme.hesitates:
+        return ZONES
+    return STOPPING_ZONES if programme.depth >= 0.0 else WAITING_ZONES
 
 
 def drives_at(site: Site, kind: Kind, ego: Kind, start_speed: float | None) -> Drives:

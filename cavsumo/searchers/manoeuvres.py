@@ -22,6 +22,7 @@ THROUGH: Range = (0.98, 1.0)
 LATE: Range = (0.15, 0.5)  # as an ego that did not react before could hardly stop
 EARLY: Range = (0.2, 1.0)
 SHORT: Range = (0.1, 0.4)  # as an ego that keeps its speed could not stop any more
+SOON: Range = (0.1, 0.7)  # of vehicles, that late
 ON: Range = (ON_SHARE, 1.0)  # without a stop
 
 # For each manoeuvre the ranges of some coordinates of ``walks.Walks`` and ``drives.Drives``.
@@ -54,11 +55,11 @@ WALKS: Mapping[str, Mapping[str, Range]] = {
     "stands": {"zone": EARLY, "depth": (0.35, 0.8), "resume": (0.32, 0.4)},
 }  # fmt: skip
 DRIVES: Mapping[str, Mapping[str, Range]] = {
-    "does not stop": {"zone": (0.1, 0.6), "speed": (0.5, 1.0), "effort": (0.5, 1.0), "depth": ON},
-    "does not stop, slowly": {"zone": (0.1, 0.6), "speed": (0.0, 0.4), "depth": ON},
+    "does not stop": {"zone": SOON, "speed": (0.5, 1.0), "effort": (0.5, 1.0), "depth": ON},
+    "does not stop, slowly": {"zone": SOON, "speed": (0.0, 0.4), "depth": ON},
     "stops in the way": {"zone": EARLY, "depth": (0.28, 0.55), "resume": (0.3, 0.4)},
     "creeps": {"zone": EARLY, "speed": (0.0, 0.3), "depth": (0.15, 0.3), "resume": (0.3, 0.4)},
-    "hesitates": {"zone": EARLY, "depth": (0.1, 0.28), "resume": (0.1, 0.4)},
+    "hesitates": {"zone": SOON, "depth": (0.1, 0.28), "resume": (0.1, 0.4)},
     "waits for the ego": {"zone": EARLY, "depth": (0.1, 0.28), "resume": (0.43, 0.58)},
     "goes on as the ego brakes": {"zone": EARLY, "depth": (0.1, 0.28), "resume": (0.7, 0.85)},
 }
@@ -67,9 +68,10 @@ MANOEUVRES: Mapping[str, Mapping[str, Mapping[str, Range]]] = {"walks": WALKS, "
 
 # Two that act together: ranges of the first and of the second.
 NEAR: Mapping[str, Range] = {"company": (TOGETHER, 1.0), "reaction": (0.0, AS_IT_BRAKES)}
+BEHIND: Mapping[str, Range] = {**NEAR, "place": (0.28, 0.36)}  # on the same side, 1 to 3.5 m on
 PAIRS: Mapping[str, Sequence[tuple[Mapping[str, Range], Mapping[str, Range]]]] = {
     "walks": (
-        (WALKS["hesitates"], {**NEAR, **WALKS["crosses"], "zone": (0.0, 0.6)}),
+        (WALKS["hesitates"], {**BEHIND, **WALKS["crosses"], "zone": (0.0, 0.6)}),
         (WALKS["waits on the road"], {**NEAR, **WALKS["crosses"], "zone": (0.0, 0.6)}),
         (WALKS["crosses"], {**NEAR, **WALKS["crosses slowly"], "zone": (0.1, 0.6)}),
         (WALKS["stands"], {**NEAR, **WALKS["comes towards"], "zone": (0.1, 0.6)}),
@@ -79,7 +81,7 @@ PAIRS: Mapping[str, Sequence[tuple[Mapping[str, Range], Mapping[str, Range]]]] =
         ),
     ),
     "drives": (
-        (DRIVES["hesitates"], {**NEAR, **DRIVES["does not stop"], "zone": (0.0, 0.6)}),
+        (DRIVES["hesitates"], {**BEHIND, **DRIVES["does not stop"], "zone": (0.0, 0.6)}),
         (DRIVES["creeps"], {**NEAR, **DRIVES["does not stop"], "zone": (0.0, 0.6)}),
         (
             {**DRIVES["does not stop"], "zone": EARLY},

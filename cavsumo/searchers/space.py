@@ -187,12 +187,14 @@ class Space:
     ) -> tuple[Place, Programme | None]:
         """The place and the programme of a further body."""
         shares, company = self._shares(point, body), self.share(point, body, "company")
-        places: Sequence[Place] = self.movements.suited(shares)
         reaction, zone = self.share(point, body, "reaction"), shares["zone"]
         if company >= TOGETHER:
-            places = [p for p in self.movements.places if abs(p.along - taken[0].along) <= NEAR_M]
             moment = self.share(point, 0, "zone") + MOMENTS * (zone - 0.5)
             shares["zone"] = min(1.0, max(0.0, moment))
+        places: Sequence[Place] = self.movements.suited(shares)
+        if company >= TOGETHER:
+            places = _near(taken[0], shares["place"], self.movements.places)
+            shares["place"] = 0.0
         place, programme = self._free(shares, places, taken)
         if reaction >= AS_IT_BRAKES:
             cue = BRAKES if reaction < AS_IT_SPEEDS_UP else SPEEDS_UP
@@ -213,6 +215,22 @@ class Space:
             if self.movements.fits(place, taken):
                 return place, programme
         raise NetworkError(f"{self.site.net}: no room for {self.bodies} testers: use fewer")
+
+
+def _near(first: Place, share: float, places: Sequence[Place]) -> list[Place]:
+    """The places where a body acts together with one at the first place, the wanted one first.
+
+    Below one half it is one on the same side, else on another: from NEAR_M before the first, along
+    the ego's path, to NEAR_M beyond it.
+    """
+    same = share < 0.5
+    wanted = first.along + NEAR_M * (4.0 * (share if same else share - 0.5) - 1.0)
+
+    def unlike(place: Place) -> tuple[bool, float, float]:
+        other_side = (place.whence == first.whence) is not same
+        return other_side, abs(place.along - wanted), abs(place.lead - first.lead)
+
+    return sorted(places, key=unlike)
 
 
 def _third(share: float) -> int:

@@ -19,6 +19,7 @@ from cavsumo.model.carriageway import Start
 from cavsumo.model.departures import Demand
 from cavsumo.model.snapshot import Snapshot
 from cavsumo.simulation.ego_progress import EgoProgress
+from cavsumo.simulation.tester_course import TesterCourse
 
 # The actions of all agents at one timestep: for each agent those of its bodies.
 Joint = Sequence[Sequence[Action]]
@@ -33,7 +34,8 @@ class Episode:
     first agent noted of it for its searcher; ``starts``: where they started, and ``waited``: where
     they were while the ego entered; ``departures``: of the background, None where they were not
     recorded or do not tell all of it; ``short``: what a human driver was short of in a test that
-    was held or unfair, as ``foresight.human_short``.
+    was held or unfair, as ``foresight.human_short``; ``course``: of the tester that was met, else
+    of the nearest.
     """
 
     judgement: Judgement
@@ -65,6 +67,7 @@ class Episode:
     forecast: Forecast | None = None
     short: float | None = None
     notes: str = ""
+    course: TesterCourse | None = None
 
     @property
     def outcome(self) -> str:

@@ -27,6 +27,7 @@ from cavsumo.simulation.moving import moved
 from cavsumo.simulation.rewards import Feedback, RewardMonitor
 from cavsumo.simulation.setup import Setup
 from cavsumo.simulation.starting import cast, generators_of, started
+from cavsumo.simulation.tester_course import tester_course
 
 
 class EpisodeLoop:
@@ -47,6 +48,8 @@ class EpisodeLoop:
         history: all states so far.
         ego_view, agent_views: the views of the ego and of each agent.
         over: whether it has ended.
+        measured: whether rewards, validity, naturalness and criticality are found from here on;
+            a rerun, which is played for its verdict alone, needs none of them.
     """
 
     def __init__(
@@ -74,7 +77,7 @@ class EpisodeLoop:
         self.history: list[Snapshot] = self._episode.seen  # for blame, progress and grade
         self._chosen: list[Joint] = []
         self._keep(record or keep)
-        self._arrived = self._cut = False
+        self._arrived, self._cut, self.measured = False, False, True
         self._learners = _learn(agents)
         self._observe(self.snapshot)
         self._end(over(setup, self.snapshot))
@@ -102,8 +105,7 @@ class EpisodeLoop:
         if braking > episode.max_decel:
             episode.max_decel = braking
         self._observe(successor)
-        judgements = [a.judgement for a in setup.assertions]
-        rewards = self._rewards.rewards(successor, judgements, self._validity.breaches)
+        rewards = self._rewarded(successor) if self.measured else None
         self._show(successor)
         if self._learners:
             _feed_back(agents, views, actions, rewards, self.agent_views)
@@ -184,11 +186,17 @@ class EpisodeLoop:
         arrived = True if self._arrived else False if late else None
         episode.progress = ego_progress(self.scene, self.history, arrived, cut=self._cut)
         episode.invalid, episode.breach = spoilt is not None, spoilt or self._validity.first
+        episode.course = tester_course(self.scene, self.history, episode.judgement.tester)
         if episode.outcome == VIOLATED:
             episode.blame = blamed(self.scene, self.history, episode.judgement)
-        elif episode.outcome in (HELD, UNFAIR):
+        elif self.measured and episode.outcome in (HELD, UNFAIR):
             episode.short = human_short(self.scene, self.history, episode.judgement)
         return episode
+
+    def _rewarded(self, successor: Snapshot) -> Feedback | None:
+        """The agents' rewards for a timestep."""
+        judgements = [a.judgement for a in self.setup.assertions]
+        return self._rewards.rewards(successor, judgements, self._validity.breaches)
 
     def _observe(self, snapshot: Snapshot) -> None:
         """Show a snapshot to the monitors and the assertions.
@@ -197,10 +205,11 @@ class EpisodeLoop:
         """
         episode, assertions = self._episode, self.setup.assertions
         contacts = episode.contacts.observe(snapshot)
-        if VIOLATED not in [a.judgement.verdict for a in assertions]:
-            self._validity.observe(snapshot, episode.contacts.pairs)
-        episode.naturalness.observe(snapshot)
-        episode.criticality.observe(snapshot, contacts)
+        if self.measured:
+            if VIOLATED not in [a.judgement.verdict for a in assertions]:
+                self._validity.observe(snapshot, episode.contacts.pairs)
+            episode.naturalness.observe(snapshot)
+            episode.criticality.observe(snapshot, contacts)
         for assertion in assertions:
             assertion.observe(snapshot, contacts)
         self.history.append(snapshot)

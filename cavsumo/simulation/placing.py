@@ -77,8 +77,8 @@ def _cleared(setup: Setup, drawn: Starts, snapshot: Snapshot, rng: np.random.Gen
 
 def _scripted(programme: Programme) -> Start:
     """Where a programmed body starts."""
-    way = programme.way
-    return Start(way.x_m, way.y_m, wrap(way.heading_rad), v=programme.speed_mps)
+    (x, y, o), v = programme.enters
+    return Start(x, y, wrap(o), v=v)
 
 
 def _told(setup: Setup, records: Sequence[Sequence[StartRecord]]) -> Starts:

@@ -73,6 +73,7 @@ class Rerun:
 
     def __init__(self, loop: EpisodeLoop, episode: Episode, broken: Assertion) -> None:
         self._loop, self._episode, self._broken = loop, episode, broken
+        loop.measured = False
         self._watch = ContactWatch(math.inf)
         self._watch.reset(loop.scene)
         self._ego = Takeover(loop.setup.ego, drives=episode.drives)

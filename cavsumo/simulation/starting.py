@@ -12,9 +12,11 @@ from cavsumo.assertions.base import Assertion
 from cavsumo.egos.base import Ego
 from cavsumo.model.carriageway import Start
 from cavsumo.model.departures import Demand
+from cavsumo.model.scenario import Scenario
+from cavsumo.model.scenario.sensor import Sensor
 from cavsumo.model.scene import Scene
 from cavsumo.model.seeds import starts_generator
-from cavsumo.model.sensors import Senses
+from cavsumo.model.sensors import Senses, scripted_errors
 from cavsumo.model.snapshot import BodyState, Snapshot
 from cavsumo.simulation.placing import Placed, placed
 from cavsumo.simulation.setup import Setup
@@ -33,7 +35,7 @@ def started(
     placing = starts_generator(seed if scenario.starts_seed is None else scenario.starts_seed)
     watching: list[Ego | Agent | Assertion] = [setup.ego, *agents, *setup.assertions]
     # Vehicles keep their distance to all bodies ahead of them, so they see everybody.
-    sensors = bool(scenario.ego_sensor or scenario.tester_sensor)
+    sensors = bool(_ego_sensor(scenario) or scenario.tester_sensor)
     everything = record or bool(setup.site.approaches) or sensors
     everything = everything or any(who.sees_background for who in watching)
 
@@ -76,7 +78,14 @@ def cast(
 
 def _senses(setup: Setup, scene: Scene, generators: Sequence[np.random.Generator]) -> Senses | None:
     """The observers of an episode, None with full observability."""
-    ego, testers = setup.scenario.ego_sensor, setup.scenario.tester_sensor
+    ego, testers = _ego_sensor(setup.scenario), setup.scenario.tester_sensor
     if not (ego or testers):
         return None
     return Senses(scene, ego, testers, setup.teams, generators)
+
+
+def _ego_sensor(scenario: Scenario) -> Sensor | None:
+    """The ego's sensor; a script may add errors to one that is perfect."""
+    if scenario.ego_sensor is None and scripted_errors(scenario.script):
+        return Sensor()
+    return scenario.ego_sensor

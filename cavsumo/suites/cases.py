@@ -24,6 +24,7 @@ from cavsumo.suites.files import FOLDER, read_suite, suite_file
 from cavsumo.suites.records import Suite
 
 CHECKED = 2000  # cases of a batch that are made before the first is played
+MOST = 100  # testers of a table
 WORDS = frozenset({"kind", "body"})  # keys whose values are words, not expressions
 
 Names = dict[str, Value]
@@ -74,6 +75,14 @@ class SuiteCases:
         route = [names.get(edge, edge) for edge in cell.test.ego_route]
         case = {"net": self.net(cell.test.net), "ego_route": route, "end": end}
         return Scenario(**{**shared, **case, "script": script}).placed(base.places)
+
+    def runs_by_net(self) -> dict[str, list[int]]:
+        """The runs on each network."""
+        found: dict[str, list[int]] = {}
+        for run in range(len(self)):
+            net = str(self.net(self.cells[run % len(self.cells)].test.net))
+            found.setdefault(net, []).append(run)
+        return found
 
     def net(self, name: str) -> Path:
         """A network that the suite names: one of cavsumo's, or a file beside the suite's."""
@@ -128,7 +137,11 @@ def _variation(cell: SuiteCell, layer: int, seed: int) -> Callable[[str, Value],
 def _script(suite: Suite, cell: SuiteCell, names: Names, layer: int) -> ScriptedTest:
     """The script of a case."""
     ego = _evaluated({**suite.ego, **cell.test.ego}, names)
-    testers = [_evaluated(_boxed(suite, table, names), names) for table in cell.test.testers]
+    testers = [
+        _evaluated(_boxed(suite, table, names), {**names, "index": index})
+        for table in cell.test.testers
+        for index in range(_count(table, names))
+    ]
     test = cell.test
     shown = (*cell.parameters, *test.shown, *test.vary_by, *test.vary_times)
     parameters = {"test": cell.test.name, **{key: names[key] for key in shown}, "variation": layer}
@@ -136,9 +149,17 @@ def _script(suite: Suite, cell: SuiteCell, names: Names, layer: int) -> Scripted
     return ScriptedTest.model_validate(content)
 
 
+def _count(table: Mapping[str, Any], names: Names) -> int:
+    """How many testers a table is."""
+    count = _number(table.get("count", 1), names)
+    if not isinstance(count, int | float) or not 1 <= count <= MOST or count != int(count):
+        raise ValueError(f"count: {count} is no whole number from 1 to {MOST}")
+    return int(count)
+
+
 def _boxed(suite: Suite, table: Mapping[str, Any], names: Names) -> dict[str, Any]:
     """A tester with the box that it names."""
-    table = dict(table)
+    table = {key: value for key, value in table.items() if key != "count"}
     name = table.pop("body", None)
     if name is None:
         return table

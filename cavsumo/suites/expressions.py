@@ -10,7 +10,7 @@ from functools import lru_cache
 from typing import Any
 
 from cavsumo.errors import UnknownName
-from cavsumo.suites import careful_driver
+from cavsumo.suites import careful_driver, crosswalk_cases, street_walks
 
 Value = bool | int | float | str
 
@@ -20,11 +20,15 @@ def _one_if(truth: Callable[..., bool]) -> Callable[..., float]:
     return lambda *numbers: float(truth(*numbers))
 
 
-FUNCTIONS: Mapping[str, Callable[..., float]] = {
+FUNCTIONS: Mapping[str, Callable[..., Any]] = {
     "abs": abs,
     "acos": math.acos,
     "atan": math.atan,
+    "cav_gym_points": street_walks.cav_gym_points,  # lists of places, not numbers
+    "chance_points": street_walks.chance_points,
     "cos": math.cos,
+    "crosswalk_errors": crosswalk_cases.errors,
+    "crosswalk_points": crosswalk_cases.points,
     "cut_in_preventable": _one_if(careful_driver.cut_in_preventable),
     "cut_out_preventable": _one_if(careful_driver.cut_out_preventable),
     "deceleration_preventable": _one_if(careful_driver.deceleration_preventable),

@@ -127,9 +127,11 @@ class Sighting:
         tame: whether the bound of the module holds for it.
         due: the reading of the lookout's odometer from which on it may touch a watcher [m].
         x, y, step: where and when its front was last read.
+        angle, o: its direction when that was last read, as SUMO has it [deg] and as we do [rad].
+        front_x, front_y: from its centre to the middle of its front edge then [m].
     """
 
-    __slots__ = ("body", "due", "forward", "half", "step", "tame", "x", "y")
+    __slots__ = tuple("angle body due forward front_x front_y half o step tame x y".split())
 
     def __init__(self, body: Body, tame: bool) -> None:
         self.body, self.tame = body, tame
@@ -138,6 +140,14 @@ class Sighting:
         self.due = -math.inf
         self.x = self.y = 0.0
         self.step = -1
+        self.turn(0.0)
+
+    def turn(self, angle: float) -> None:
+        """Take in its direction [deg]; most bodies go straight on, and keep it."""
+        self.angle = angle
+        o = (90.0 - angle) * RADIANS
+        self.o = o + 2 * math.pi if o <= -math.pi else o
+        self.front_x, self.front_y = self.half * math.cos(self.o), self.half * math.sin(self.o)
 
 
 class Lookout:
@@ -233,22 +243,16 @@ class Lookout:
     def _looked(self, others: Sequence[Sighting]) -> list[RawState]:
         """The states of bodies as SUMO has them."""
         # from_sumo, written out: with everything read this is the innermost loop of a timestep
-        position, angle, speed, cos, sin = (
-            self._position,
-            self._angle,
-            self._speed,
-            math.cos,
-            math.sin,
-        )
+        position, angle, speed = self._position, self._angle, self._speed
         found = []
         for other in others:
             body = other.body
-            name, half = body.id, other.half
+            name = body.id
             x, y = position(name)
-            o = (90.0 - angle(name)) * RADIANS
-            if o <= -math.pi:
-                o += 2 * math.pi
-            found.append((body, x - half * cos(o), y - half * sin(o), speed(name), o))
+            turned = angle(name)
+            if turned != other.angle:
+                other.turn(turned)
+            found.append((body, x - other.front_x, y - other.front_y, speed(name), other.o))
         return found
 
 

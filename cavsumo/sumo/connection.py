@@ -19,7 +19,7 @@ from cavsumo.model.scenario import Scenario
 from cavsumo.network.site import Site
 from cavsumo.sumo.calls import direct
 from cavsumo.sumo.late_routes import LateRoutes, refusal
-from cavsumo.sumo.native import Library
+from cavsumo.sumo.native import Library, keep_xml
 from cavsumo.sumo.options import OPTIONS
 from cavsumo.sumo.recorded_demand import route_file, types_told
 from cavsumo.sumo.reseeding import reseed
@@ -43,6 +43,7 @@ class Simulations:
     def __init__(self, sumo: Any, scenario: Scenario, site: Site, ego: Ego, folder: Path) -> None:
         self._sumo, self._scenario, self._site = sumo, scenario, site
         self._step = direct(sumo.simulation, "step")
+        keep_xml(sumo)
         self._types = folder / "types.add.xml"
         self._types.write_text(type_file(scenario, ego), encoding="utf-8")
         self._stands_by = self.stood_by = False
@@ -92,7 +93,8 @@ class Simulations:
             self._sumo.start(self.command(seed, routes))
         self.set_light()
         route = self._site.route
-        self._sumo.route.add("cavsumo_ego", list(route.edges))
+        first = 0 if demand is None or demand.ego is None else demand.ego.edge
+        self._sumo.route.add("cavsumo_ego", list(route.edges[first:]))
         self._sumo.route.add("cavsumo_tester", [route.edges[0]])
 
     def advance(self) -> None:

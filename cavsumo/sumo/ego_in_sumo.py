@@ -61,6 +61,8 @@ class EgoInSumo:
         if isinstance(command, Acceleration):
             if self._driven is not None:
                 raise EgoError("an ego that steers itself cannot be handed to one that does not")
+            if self._guided is not None and self._guided.held():
+                return
             v = min(kind.v_max, max(kind.v_min, ego.v + command.value * self._dt))
             libsumo.vehicle.setSpeed(EGO, v)
         elif isinstance(command, Drive):

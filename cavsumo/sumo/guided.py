@@ -2,8 +2,9 @@
 
 SUMO or the ego's controller decides how fast it drives, and SUMO counts the distance that it has
 driven; where it is follows from that, on the way of the script. SUMO's own lanes are its guide to
-leaders and traffic rules only. Until shortly before the test (``begins_m``) SUMO's driver, which
-dawdles, keeps the speed of the test.
+leaders and traffic rules only. Until shortly before the test (``begins_m``) the ego is held at the
+speed of the test: SUMO's driver dawdles, and a controller may give way to a vehicle ahead from the
+moment at which it enters. An ego that steers itself is not held.
 """
 
 from __future__ import annotations
@@ -33,7 +34,7 @@ class GuidedEgo:
         self._sumo, self._script, self._body = sumo, script, body
         self._axle = script.ego.axle(body.kind.length)
         self._curve = script.ego.way.curve
-        self._held, self._before = True, 0.0
+        self._held, self._kept, self._before = True, True, 0.0
 
     def enter(self) -> None:
         """Give the ego, which stands on its lane, the speed of the test in the next timestep."""
@@ -50,10 +51,15 @@ class GuidedEgo:
         self._before = float(self._sumo.vehicle.getDistance(self._body.id))
         return self.state()
 
+    def held(self) -> bool:
+        """Whether it still keeps the speed of the test instead of obeying its controller."""
+        self._held = self._held and self._front() < self._script.begins_m
+        return self._held
+
     def release(self) -> None:
         """Leave the speed to SUMO's driver once it is near enough."""
-        if self._held and self._front() >= self._script.begins_m:
-            self._held = False
+        if self._kept and not self.held():
+            self._kept = False
             self._sumo.vehicle.setSpeedMode(self._body.id, ALL_CHECKS)
             self._sumo.vehicle.setSpeed(self._body.id, -1.0)
 

@@ -13,6 +13,7 @@ import shapely
 from cavsumo.egos.base import Ego
 from cavsumo.model.bodies import PEDESTRIAN
 from cavsumo.model.carriageway import Start
+from cavsumo.model.departures import Entry
 from cavsumo.model.geometry import Box, gap
 from cavsumo.model.scenario import Scenario
 from cavsumo.model.snapshot import BodyState
@@ -42,17 +43,23 @@ class MovedBodies:
         self._move = direct(libsumo.vehicle, "moveToXY")
         self._set_speed = direct(libsumo.vehicle, "setSpeed")
 
-    def insert(self, states: Sequence[BodyState], starts: Sequence[Start]) -> None:
-        """Add the ego and the testers, each at its place before the first timestep."""
+    def insert(
+        self, states: Sequence[BodyState], starts: Sequence[Start], entry: Entry | None = None
+    ) -> None:
+        """Add the ego and the testers, each at its place before the first timestep.
+
+        ``entry``: where the ego enters, if not at the beginning of its route.
+        """
         route = self._site.route
         # That of a script enters standing, which SUMO always allows, and then has its speed.
         speed = self._ego.depart_speed if self._scenario.script is None else 0.0
+        speed = speed if entry is None else entry.speed
         libsumo.vehicle.add(
             EGO,
             "cavsumo_ego",
             typeID="cavsumo_ego",
-            departLane=str(route.lane),
-            departPos=f"{route.depart_m}",
+            departLane=str(route.lane if entry is None else entry.lane),
+            departPos=f"{route.depart_m if entry is None else entry.along}",
             departSpeed="max" if speed is None else f"{speed}",
             arrivalPos=f"{route.arrive_m}",
         )

@@ -1,12 +1,14 @@
 """Functions of SUMO's library that libsumo does not offer, called by their C++ names.
 
-They are those with which SUMO itself starts: it sets its options, seeds its generators, and opens
-its route files. A build of libsumo that has other functions cannot be called so.
+They are those with which SUMO itself starts: it sets its options, seeds its generators, opens its
+route files, and sets up its XML parser (Xerces). A build of libsumo that has other functions cannot
+be called so.
 """
 
 from __future__ import annotations
 
 import ctypes
+from functools import cache
 from typing import Any
 
 from cavsumo.errors import SimulationError
@@ -17,6 +19,25 @@ SET = "_ZN11OptionsCont3setERKNSt7__cxx1112basic_stringIcSt11char_traitsIcESaIcE
 SEED_ALL = "_ZN9NLBuilder14initRandomnessEv"
 OPEN_ROUTES = "_ZN9NLBuilder23buildRouteLoaderControlERK11OptionsCont"
 READ_ROUTES = "_ZN22SUMORouteLoaderControl8loadNextEx"
+SET_UP_XML = (
+    "_ZN11xercesc_3_216XMLPlatformUtils10InitializeEPKcS2_PNS_12PanicHandlerEPNS_13MemoryManagerE"
+)
+LANGUAGE = b"en_US"  # of the parser's messages, as SUMO has it
+
+
+@cache
+def keep_xml(sumo: Any) -> None:
+    """Have the XML parser set up for as long as this process lives.
+
+    Each start of SUMO sets it up and each end takes it down, which takes more than a millisecond.
+    The parser counts who uses it. A build with another parser goes on as ever.
+
+    Args:
+        sumo: the module libsumo.
+    """
+    set_up = getattr(ctypes.CDLL(sumo._libsumo.__file__), SET_UP_XML, None)
+    if set_up is not None:
+        set_up(ctypes.c_char_p(LANGUAGE), None, None, None)
 
 
 class StdString(ctypes.Structure):

@@ -147,7 +147,7 @@ class World:
             self.simulations.begin(seed, demand)
             if note:
                 self._departures = self._notes(demand, states)
-            self._moved.insert(states, starts)
+            self._moved.insert(states, starts, None if demand is None else demand.ego)
             self._enter(states, guided)
             self._vehicles = tuple(make_room(self._vehicles, states, starts))
         self._states = tuple(states)
@@ -300,7 +300,9 @@ class World:
         """Where to note who departs; None when departures do not tell all of the demand."""
         types = self.simulations.types_told if demand is None else demand.types
         mine = frozenset((EGO, *(state.id for state in states)))
-        return None if types is None else DepartureNotes(types, mine)
+        if types is None:
+            return None
+        return DepartureNotes(libsumo, types, mine, self.dt, demand.ego if demand else None)
 
     @property
     def departures(self) -> Demand | None:
@@ -309,11 +311,9 @@ class World:
 
     def _advance(self) -> None:
         """One timestep of SUMO; those who depart in it are noted."""
-        notes = self._departures
-        now = libsumo.simulation.getTime() if notes is not None else 0.0
         self.simulations.advance()
-        if notes is not None:
-            notes.add(libsumo, now)
+        if self._departures is not None:
+            self._departures.add()
         self._vehicles = self._vehicle_ids()
 
     def _snapshot(self) -> Snapshot:

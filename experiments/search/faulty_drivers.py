@@ -204,7 +204,7 @@ FAULTS = {
     "SeesPoints": Ability(shrinks=True, room_m=0.0),
     "SeesTheNearestOnly": Ability(nearest_only=True, testers=2),
     "IgnoresOcclusion": Ability(hidden_rad=0.15, recognises_s=1.5, testers=2),
-    "TakesGroupsForOne": Ability(groups_m=4.0, testers=2),
+    "TakesGroupsForOne": Ability(groups_m=8.0, testers=2),
     "BlindToTheLeft": Ability(blind_left=True),
     "MisjudgesTheSide": Ability(aside_m=1.3),
     # prediction

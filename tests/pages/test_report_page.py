@@ -11,7 +11,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from report_files import ERROR, FAILED, HELD, JUDGED, NOTHING, SOME, UNFAIR, write
+from report_files import ERROR, FAILED, HELD, JUDGED, NOTHING, SOME, UNFAIR, judged, write
 
 from cavsumo.cli import main
 from cavsumo.errors import InputError
@@ -97,6 +97,20 @@ def test_the_page_tells_preventable_failures_blame_and_invalid_episodes(
     assert "Preventable failures, of tests" in text
     assert "tester:stepped-out" in text
     assert "Preventable failures, of" not in Words(page(write(tmp_path / "some.csv", SOME))).text
+
+
+def test_the_page_of_a_search_has_its_archive(tmp_path: Path, page: Page) -> None:
+    """A field for each side, speed and place, with the best that came of it; alike failures."""
+    course = {"from_side": "left", "tester_speed_mps": 0.6, "meets_m": 21.0}
+    hit = {**judged(1), "grade": 3.0, **course}
+    missed = {"outcome": "not_triggered", "grade": -3.5, **course, "meets_m": 42.0}
+    text = page(write(tmp_path / "a.csv", [[hit], [missed]], agents=["search"], reference="human"))
+    assert '<td class="band preventable" title="1 test; the best, run 0: preventable f' in text
+    assert '<td class="band none"></td><td class="band missed" title="1 test; the best' in text
+    words = Words(text).text
+    assert "search: 2 of 12 fields have a test" in words
+    assert "from the left, 0.6 m/s, 20 to 30 m along the ego's path, hit at 2 to 4 m/s" in words
+    assert "What was searched" not in page(write(tmp_path / "some.csv", SOME))
 
 
 def test_nothing_found_is_an_answer(tmp_path: Path) -> None:

@@ -83,6 +83,37 @@ def test_early_end(play: Play) -> None:
     assert shorter < whole
 
 
+def test_rare_events(play: Play) -> None:
+    """Two replications of one process: the truth, and a gain."""
+    _, row = play("rare_events", "--p3", "0.003", "--replications", "2").splitlines()
+    assert numbers(row)[0] == 1.141e-05
+    assert numbers(row)[6] > 1e3
+    assert row.endswith("p3 0.003")
+
+
+def test_estimators(play: Play) -> None:
+    """Two replications of each method on each function; probabilities are known."""
+    _, *found = play("estimators", "--replications", "2", "--episodes", "200").splitlines()
+    assert [row.split()[2] for row in found[:5]] == [
+        "auto", "monte-carlo", "importance", "sobol", "subset",
+    ]  # fmt: skip
+    assert {row.split()[0]: row.split()[1] for row in found} == {
+        "corner": "1.0e-04", "corners": "1.0e-03", "ball": "1.2e-04", "scattered": "1.0e-03",
+        "pedestrian": found[-1].split()[1],
+    }  # fmt: skip
+
+
+def test_estimates(play: Play) -> None:
+    """A truth, and two estimates of few episodes by each method."""
+    words = "--net", "pedestrians", "--ego", "constant", "--truth", "20"
+    words += "--replications", "2", "--episodes", "20"
+    words += "--method", "auto", "--method", "monte-carlo"
+    truth, _, *methods = play("estimates", *words).splitlines()
+    assert truth.startswith("truth: ")
+    assert " in 20 episodes of " in truth
+    assert [row.split()[0] for row in methods] == ["auto", "monte-carlo"]
+
+
 def test_reference_tracks(play: Play) -> None:
     """One cell: the largest differences are within the tolerances."""
     test, everything = play("reference_tracks", "--only", "CPFA/60/50").splitlines()[1:]
@@ -99,12 +130,43 @@ def test_un_r157(play: Play) -> None:
     assert line.split() == ["deceleration", "1,121", "0", "0"]
 
 
+def test_searched_vehicles(play: Play) -> None:
+    """A line for each agent."""
+    said = play("searched_vehicles", "--kind", "bicycle", "--ego", "constant", "--runs", "2")
+    cells = [[cell.strip() for cell in line.split("|")[1:5]] for line in said.splitlines()[2:]]
+    assert cells == [["crossing", "bicycle", "constant", agent] for agent in ("search", "timing")]
+
+
+def test_ast_crosswalk(play: Play) -> None:
+    """A few episodes of each starting point, and one draw of each in SUMO."""
+    lines = play("ast_crosswalk", "--episodes", "50", "--sumo", "1").splitlines()[1:]
+    assert [line.split()[0] for line in lines] == ["start-1", "start-2", "start-3"]
+    assert all("of 50" in line and line.endswith("alike 1") for line in lines)
+
+
+def test_street_suites(play: Play) -> None:
+    """One draw of each tester and number of pedestrians in one suite."""
+    lines = play("street_suites", "--suite", "chance-2019", "--draws", "1", "-j", "1").splitlines()
+    assert len(lines) == 17
+    assert lines[-1].split()[:3] == ["chance-2019", "election", "10"]
+
+
 def test_avoidable(play: Play) -> None:
     """One ego, one agent, both reference drivers."""
     said = play("avoidable", "--runs", "1", "-j", "1", EGOS=("constant",), AGENTS=("random",))
     assert [line.split()[:2] for line in said.splitlines()[1:]] == [
         ["constant", "random"],
         ["constant", "all"],
+    ]
+
+
+def test_aims(play: Play) -> None:
+    """Two episodes of each aim, of which the first explores."""
+    words = "--runs", "2", "--explore", "1", "--net", NET
+    found = play("aims", *words).splitlines()[1:]
+    assert [line.split()[:3] for line in found] == [
+        ["pedestrians", "preventable", "1"],
+        ["pedestrians", "violation", "1"],
     ]
 
 
@@ -128,9 +190,18 @@ def test_branching(play: Play, capsys: pytest.CaptureFixture[str]) -> None:
     assert said.count("5 of 5 branches the same (0 errors), 1 of 1 episodes") == 2
     assert "refused  pedestrians" in said
     assert "by fork" in said
-    before, after = said.split("resources")[1].splitlines()[0].split(": ")[1].split("; ")
-    assert before.rpartition(",")[0] == after.rpartition(",")[0]
+    before, after, _ = said.split("before 2 branches: ")[1].splitlines()[0].split("; ")
+    assert before.rpartition(",")[0] == after.removeprefix("after: ").rpartition(",")[0]
     assert "verdicts the same" in said
+
+
+def test_budget(play: Play) -> None:
+    """Parts of a few episodes, which add up."""
+    said = play("budget", "--net", NET, "--testers", "1", "--episodes", "5")
+    parts, together = said.splitlines()[1:-1], said.splitlines()[-1]
+    total = numbers(together)[-1]
+    assert total > 0.0
+    assert sum(numbers(line)[-1] for line in parts) == pytest.approx(total, abs=0.05 * len(parts))
 
 
 def test_cav_gym(play: Play) -> None:
@@ -203,6 +274,19 @@ def test_memory(play: Play) -> None:
     said = play("memory", "--stubs", "100", "--episodes", "20")
     assert said.count("stubs: ") >= 2
     assert said.count("episodes: ") == 3
+
+
+def test_minimise(play: Play) -> None:
+    """A failure at the crossing, by force too, and with planted bodies."""
+    said = play(
+        "minimise", "--failures", "1", "--runs", "20", "--force", "1", "--planted", "1",
+        "--setting", "crossing, pedestrians", PLANTED=5,
+    )  # fmt: skip
+    _, one, everything, force, planted = said.splitlines()
+    assert one.split()[2:7] == ["1", "1", "1", "1", "1"]
+    assert everything.split()[1:] == one.split()[2:]
+    assert re.fullmatch(r"by force: 0 of \d+ single reductions of 1 results fail the same", force)
+    assert planted.startswith("planted: 5 bodies in ")
 
 
 def test_overlaps(play: Play) -> None:
@@ -327,6 +411,14 @@ def test_suite_drivers(play: Play) -> None:
     _, first, second, _ = play("suite_drivers", *words).splitlines()
     assert first.split()[:4] == ["constant", "0", "of", "1"]
     assert second.split()[:4] == ["sumo:IDM/0", "1", "of", "1"]
+
+
+def test_drivers_table(play: Play) -> None:
+    """One driver, one case of each suite, one episode on one network."""
+    words = [NET, "--ego", "constant", "--ncap", "372", "--r157", "36941", "--runs", "1"]
+    _, _, line, _, head, _, by_test = play("drivers_table", *words, "--traffic", "0").splitlines()
+    assert line.startswith("| constant | 0 of 1 [0, 79 %] | 10.0 | ")
+    assert (head, by_test) == ("| ego | CPNA |", "| constant | 0/1, 10 |")
 
 
 def test_ssm(play: Play) -> None:

@@ -28,6 +28,11 @@ def test_the_process_that_waits_has_no_sumo() -> None:
     assert "libsumo" not in loaded_by("cavsumo.batch.playing, cavsumo.cli.commands.run")
 
 
+def test_the_plugin_of_pytest_is_light() -> None:
+    """Pytest loads it wherever cavsumo is installed."""
+    assert not HEAVY & loaded_by("cavsumo.kept.pytest_plugin")
+
+
 def test_an_ego_is_checked_without_pytest() -> None:
     """Who installs cavsumo alone has the command too."""
     assert "pytest" not in loaded_by("cavsumo.cli.commands.check_ego")

@@ -101,6 +101,23 @@ def test_a_tester_moved_from_outside_gives_the_row_of_a_batch(
     assert times == [row["trigger_time_s"]]
 
 
+def test_the_grade_of_an_episode_may_be_the_reward(set_up: Callable[..., Any], make: Make) -> None:
+    """That of the row, judged by the reference driver, at the end and nothing before."""
+    how, seed = {"ego": "constant", "end": 20.0}, 6
+    batch = {"bodies_per_agent": 3, "trace": "none", "agents": ("timing",), "reference": "human"}
+    with EpisodeRunner(set_up("pedestrians", **batch, **how)) as runner:
+        row = runner.play(Job(0, "timing", seed)).outcome.row
+        noted = _tester_actions(runner, seed)
+    assert (row["outcome"], row["avoidable"] in (0, 1)) == ("violated", True)
+    env = make(until="verdict", reward="grade", **how)
+    env.reset(seed=seed)
+    *before, last = [step[1] for step in to_the_end(env, iter(noted))]
+    assert not any(before)
+    assert last == pytest.approx(row["grade"])
+    with pytest.raises(InputError, match="reward 'grade' needs until='verdict'"):
+        make(reward="grade")
+
+
 def _tester_actions(runner: EpisodeRunner, seed: int) -> list[Any]:
     """The actions of the timing agent in an episode, from -1 to 1."""
     agent = AGENTS.make("timing", {})

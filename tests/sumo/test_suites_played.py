@@ -12,7 +12,8 @@ from inline import cavsumo as command
 from support import benchmark, rows
 
 import cavsumo
-from cavsumo.egos import Acceleration
+from cavsumo.egos import Acceleration, Drive
+from cavsumo.model.crosswalk import CrosswalkStart, failures, normals, walked
 from cavsumo.results.trace_file import read_trace_text
 
 NAME = "euroncap-2026"
@@ -112,6 +113,21 @@ def test_a_car_that_cuts_in_has_its_gap_and_its_lateral_speed(tmp_path: Path) ->
     assert cut_in.cases["preventable"].tolist() == [1]
 
 
+def test_the_crosswalk_is_played_as_its_model_computes_it(tmp_path: Path) -> None:
+    """The pedestrian is at each place of the model, and the same draws fail."""
+    draws, start = range(1, 31), CrosswalkStart(-4.0, 0.75)
+    how: dict[str, Any] = {"only": [f"start-1/{draw}" for draw in draws], "progress": False}
+    how |= {"values": {"walk_mps": 0.75}, "trace": "all", "output": tmp_path / "a.csv"}
+    played = cavsumo.suite("ast-crosswalk", "crosswalk", **how)
+    failed = [bool(failures(start, normals(draw))[0]) for draw in draws]
+    assert (played.rows["outcome"] == "violated").tolist() == failed
+    assert 0 < sum(failed) < len(failed)
+    pushes = normals(1)[0, :, :2] * (0.1**0.5, 0.1)
+    track = TRACKS.played_track(tmp_path / "a" / "run000000.jsonl.gz").states
+    for (_, state), (x, y) in zip(track, walked(start, pushes), strict=False):
+        assert state[1:3] == pytest.approx((x, y - 1.75), abs=1e-3)
+
+
 def test_the_target_commits_once(tmp_path: Path) -> None:
     """It walks on as it began, although the ego brakes."""
     how: dict[str, Any] = {"only": "CPFA/30/50", "trace": "all", "progress": False}
@@ -123,10 +139,40 @@ def test_the_target_commits_once(tmp_path: Path) -> None:
     assert targets[1][: len(targets[0])] == targets[0]
 
 
+def test_a_controller_is_held_at_the_speed_until_the_test_begins(tmp_path: Path) -> None:
+    """Four seconds before the contact; it would have given way to the car ahead before that."""
+    how: dict[str, Any] = {"only": ["CCRm/30/20/100", "CCRb/50/0"], "progress": False}
+    how |= {"trace": "all"}
+    played = cavsumo.suite(NAME, "time-gap", output=tmp_path / "a.csv", **how)
+    assert list(played.rows["outcome"]) == ["held", "held"]
+    lines = read_trace_text(tmp_path / "a" / "run000000.jsonl.gz").splitlines()[1:]
+    speeds = [json.loads(line)["ego"][2] for line in lines]
+    before = round((6.0 - 4.0) / 0.02)  # lead_s - FOUR_S
+    assert speeds[: before + 1] == pytest.approx([30 / 3.6] * (before + 1))
+    assert speeds[before + 10] < 30 / 3.6 - 0.1
+
+
+def test_a_target_that_drives_into_the_standing_ego_ends_the_case(tmp_path: Path) -> None:
+    """Head on: the ego has no impact, and nothing that comes later changes that."""
+    how: dict[str, Any] = {"only": "CCFhos/50/50/50", "progress": False}
+    (row,) = cavsumo.suite(NAME, "time-gap", output=tmp_path / "a.csv", **how).rows.to_dict(
+        "records"
+    )
+    assert (row["outcome"], row["contacts"]) == ("held", 1)
+    assert row["time_s"] < 8.0
+
+
+class Steers(Brakes):
+    """The same by throttle and steering: it is not held."""
+
+    def act(self, snapshot: Any) -> Drive:
+        return Drive(super().act(snapshot).value, 0.0)
+
+
 def test_an_ego_without_the_speed_of_the_test_is_a_row_that_says_so(tmp_path: Path) -> None:
     """It slowed down before the test began."""
     how: dict[str, Any] = {"only": "CPFA/30/50", "progress": False}
-    played = cavsumo.suite(NAME, Brakes(200.0), output=tmp_path / "a.csv", **how)
+    played = cavsumo.suite(NAME, Steers(200.0), output=tmp_path / "a.csv", **how)
     (row,) = played.rows.to_dict("records")
     assert row["outcome"] == "error"
     assert "it entered with the speed of CPFA/30/50, 30.0 km/h: it does not hold it" in row["error"]
@@ -178,6 +224,20 @@ def test_a_report_and_junit_know_the_cases(played: cavsumo.Results) -> None:
     assert "CPNCO/50/50" in (folder / "grid.html").read_text(encoding="utf-8")
     done = command(folder, "certify", str(played.file), "0")
     assert (done.returncode, "holds scripted tests" in done.stderr) == (2, True)
+
+
+def test_a_report_of_two_networks_has_pages_of_both(tmp_path: Path) -> None:
+    """A map of each, and pages that show each case on its own network and way."""
+    how: dict[str, Any] = {"only": ["CPNA/60/50", "CCFtap/10/45", "CCFtap/20/30"]}
+    cavsumo.suite(NAME, "constant", progress=False, output=tmp_path / "a.csv", **how)
+    words = ["report", "a.csv", "--html", "r.html", "--replays", "3", "-o", "r.txt"]
+    done = command(tmp_path, *words)
+    assert (done.returncode, "No replay pages" in done.stderr) == (0, False), done.stderr
+    pages = sorted(page.name for page in (tmp_path / "r_replays").iterdir())
+    assert pages == ["run000000.html", "run000001.html", "run000002.html"]
+    text = (tmp_path / "r.html").read_text(encoding="utf-8")
+    assert "proving-road" in text
+    assert "proving-crossing" in text
 
 
 def test_a_case_of_a_suite_that_is_gone_is_replayed_from_its_trace(tmp_path: Path) -> None:

@@ -17,12 +17,13 @@ from shapely.affinity import rotate
 from shapely.geometry import LineString, Polygon, box
 
 from cavsumo.agents import AGENTS, Agent, Scene
+from cavsumo.agents.exposed import ExposureAgent
 from cavsumo.agents.programme import WalkProgramme
 from cavsumo.agents.searched import SearchAgent
 from cavsumo.agents.triggers import Timing
 from cavsumo.egos.base import EGO_KIND
 from cavsumo.model.bodies import NOOP, PEDESTRIAN, Body
-from cavsumo.model.carriageway import Roads, Start
+from cavsumo.model.carriageway import MarkedCrossing, Roads, Start
 from cavsumo.model.geometry import corners
 from cavsumo.model.kinematics import step_floats
 from cavsumo.model.polyline import Path
@@ -38,16 +39,17 @@ ZONES = {"max_decel": 9.0, "reaction_time": 0.675, "wheelbase": EGO_KIND.wheelba
 
 
 def played(
-    scene: Scene, agent: Agent, first: State, ego: State, seconds: float
+    scene: Scene, agent: Agent, first: State, ego: State, seconds: float, lights: str = ""
 ) -> Iterator[Snapshot]:
-    """What is seen while one body acts and the ego keeps its speed and heading."""
+    """What is seen while one body acts, the ego keeps its speed and heading, and lights stay."""
     agent.reset(scene, [0], np.random.default_rng(1))
     state = first
     for step in range(round(seconds / scene.dt) + 1):
         x, y, v, o = ego
         t = step * scene.dt
         driver = BodyState(scene.ego, x + v * t * math.cos(o), y + v * t * math.sin(o), v, o)
-        snapshot = Snapshot(step, t, driver, 0.0, (BodyState(scene.bodies[0], *state),))
+        bodies = (BodyState(scene.bodies[0], *state),)
+        snapshot = Snapshot(step, t, driver, 0.0, bodies, crossing_lights=tuple(lights))
         yield snapshot
         (action,) = agent.choose_action(snapshot)
         kind = scene.bodies[0].kind
@@ -363,3 +365,52 @@ def test_a_programme_enters_the_strip_at_its_zone(
             assert gap == pytest.approx(braking + zone * reaction, abs=0.45 * SPEED), what
             return
     pytest.fail(f"{what}: never entered the strip")
+
+
+# By an exposure -----------------------------------------------------------------------------------
+
+
+def stepped_off(scene: Scene, lights: str = "", **walker: object) -> float | None:
+    """How many seconds the ego has left as a pedestrian is on the road; None if it stays."""
+    programme = WalkProgramme(0.0, 1.2, 0.0, 0.0, 0.0, None, 1.2, 0.0, 0.0, 0.0)
+    given = {"arrival_s": 4.0, "accepts": True, "complies": True, **walker}
+    agent = ExposureAgent()
+    agent.remember({"starts": [], "walkers": [{**given, "programme": list(programme)}]})
+    start, ego = scene.starts[0], (2.25, LANE, SPEED, 0.0)
+    frames = played(scene, agent, (start.x, start.y, 0.0, start.o), ego, 94.0 / SPEED, lights)
+    for snapshot in frames:
+        body = snapshot.testers[0]
+        if max(y for _, y in corners(body.box)) > KERB:
+            ahead = start.x - snapshot.ego.x - scene.ego.kind.length / 2 - body.body.kind.width / 2
+            return ahead / SPEED
+    return None
+
+
+@pytest.mark.parametrize("arrival", [3.0, 6.0])
+def test_a_pedestrian_of_an_exposure_decides_as_it_arrives(
+    straight_scene: MakeScene, arrival: float
+) -> None:
+    """The ego then has so much time left; who does not accept it stays for good."""
+    scene = straight_scene([(75.0, SOUTH, 0.0)])
+    left = stepped_off(scene, arrival_s=arrival)
+    assert left == pytest.approx(arrival - 0.8, abs=0.4)  # it has to gain speed
+    assert stepped_off(scene, arrival_s=arrival, accepts=False) is None
+
+
+@pytest.mark.parametrize(
+    ("light", "accepts", "complies", "goes"),
+    [
+        ("G", False, True, True),
+        ("r", True, True, False),
+        ("r", True, False, True),
+        ("r", False, False, False),
+    ],
+)
+def test_a_light_decides_for_those_who_comply(
+    straight_scene: MakeScene, light: str, accepts: bool, complies: bool, goes: bool
+) -> None:
+    """At green everybody goes, at red those who do not comply and accept the gap."""
+    scene = straight_scene([(75.0, SOUTH, 0.0)])
+    here = MarkedCrossing("c", 70.0, 80.0, box(70, -4, 80, 4), ("light", 0), False)
+    scene = dataclasses.replace(scene, crossings=(here,))
+    assert (stepped_off(scene, light, accepts=accepts, complies=complies) is not None) is goes

@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 import json
 import math
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -12,9 +13,13 @@ import numpy as np
 import pytest
 
 from cavsumo.agents import AGENTS
+from cavsumo.agents.best_response import LONGEST_NOTICE_S, notice_of
 from cavsumo.agents.planning import response, solving
+from cavsumo.agents.planning.coordinates import Coordinates
 from cavsumo.agents.planning.opponent import KEEPS, OLDEST, AccelerationReader, Counts, situation
 from cavsumo.agents.planning.response import (
+    HUMAN_DECEL,
+    HUMAN_REACTION_S,
     SPEEDS,
     STAND,
     WALK,
@@ -28,7 +33,10 @@ from cavsumo.agents.planning.response import (
     scale,
 )
 from cavsumo.agents.planning.solving import best_response, chain, layer, roll_out, unsolved
+from cavsumo.egos.reference.encounter import EVALUATION_S
+from cavsumo.egos.reference.human import DELAY_S, FULL_MPS2, RISE_S
 from cavsumo.errors import InputError
+from cavsumo.model.scene import Scene
 
 DT = 0.1
 
@@ -179,6 +187,36 @@ def test_a_hit_in_the_strip_is_free_and_a_stop_is_not() -> None:
     assert (hit.over, hit.price) == (1.0, 0.0)
     stop = move(one(-3, 0.5, 0.5), np.array([WALK]), np.array([-9.0]), np.array([1]), grid, Aim())
     assert (stop.over, stop.price) == (1.0, 1.0)
+
+
+@pytest.mark.parametrize(
+    ("notice", "inside", "price"),
+    [  # at 8 m/s a human needs 1.45 s and 8 / (2 * 7.59) s
+        (None, 3, 0.0),
+        (2.5, 3, 0.0),
+        (1.5, 6, 0.25),
+        (0.5, 3, 1.0),
+    ],
+)
+def test_a_hit_that_nobody_could_have_prevented_has_a_price(
+    notice: float | None, inside: int, price: float
+) -> None:
+    """A human sees the body as long as it is on the road before the strip, and in it."""
+    grid, aim = grid_for(driver(10, -4.5), DT), Aim(notice=notice)
+    steps = one(1 - inside, 0.5, 8.0), np.array([WALK]), np.zeros(1), np.array([1])
+    after = move(*steps, grid, aim)
+    assert after.over == 1.0
+    assert after.price == pytest.approx(price, abs=0.2)
+    assert HUMAN_REACTION_S == EVALUATION_S + DELAY_S + RISE_S / 2
+    assert HUMAN_DECEL == FULL_MPS2
+
+
+def test_a_body_is_noticed_for_as_long_as_it_is_on_the_road(
+    straight_scene: Callable[..., Scene],
+) -> None:
+    """From the near kerb it walks 0.68 m to the strip, from the far one 4.33 m, at 1.4 m/s."""
+    scene = straight_scene([(60.0, -5.15, 0.0), (60.0, 5.15, 0.0)])
+    assert [notice_of(Coordinates(scene, i)) for i in (0, 1)] == [0.5, LONGEST_NOTICE_S]
 
 
 def test_a_committed_body_is_hit_by_an_ego_that_does_not_look() -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import itertools
 import json
 import math
 from fractions import Fraction
@@ -342,6 +343,28 @@ def test_a_game_from_a_function() -> None:
     assert game.labels is not None
     assert set(game.labels) == {("walk", x) for x in range(4)}
     assert solve(game).lower[0] == pytest.approx(-10 / 3, abs=1e-6)
+
+
+def test_weights_that_are_no_policies_are_refused_by_the_compiled_loop_too(
+    ring: Game, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Each cell of either policy in turn at several wrong weights, and at its own."""
+    import dataclasses
+
+    pytest.importorskip("numba")
+    found = solve(ring).certificate
+    for whose in ("tester", "ego"):
+        weights_tried = (0.0, 1.0, -1.0, 0.5, math.nan)
+        for cell, weight in itertools.product(range(0, ring.n_cells, 501), weights_tried):
+            weights = getattr(found, whose).copy()
+            weights[cell] = weight
+            wrong = dataclasses.replace(found, **{whose: weights})
+            answers = []
+            for least in (0, math.inf):
+                monkeypatch.setattr(compiled, "COMPILED", least)
+                answers.append(holds(ring, wrong))
+            assert answers[0] == answers[1]
+            assert not (weight in (-1.0, 0.5) and answers[0])
 
 
 @pytest.mark.parametrize("fast", [False, True])

@@ -30,29 +30,23 @@ ROOMS = {
         "simulation": "model network agents assertions egos sumo",
         "results": "model suites network agents assertions egos sumo simulation",
         "searchers": "model network agents",
-        "batch": "model suites network agents assertions egos sumo simulation results searchers",
-        "report": "model suites network assertions egos results batch",
+        "probability": "model games network agents searchers",
+        "batch": "model suites network agents assertions egos sumo simulation results searchers "
+        "probability",
+        "kept": "model network agents assertions results batch",
+        "report": "model suites network assertions egos results probability batch kept",
         "interop": "model network sumo results",
-        "api": "model suites network agents batch report results",
+        "api": "model suites network agents batch kept report results",
         "envs": "model network agents assertions egos simulation results batch",
         "testing": "model network agents assertions egos",
-        "cli": "model games suites network agents assertions egos results batch report interop "
-        "testing",
+        "cli": "model games suites network agents assertions egos results batch kept report "
+        "interop testing",
     }.items()
 }
 ROOT = {"__init__", "__main__", "errors"}
 
-OPTIONAL = {
-    "IPython",
-    "PIL",
-    "dask",
-    "distributed",
-    "numba",
-    "osmium",
-    "pettingzoo",
-    "pytest",
-    "ribs",
-}
+OPTIONAL = {"IPython", "PIL", "dask", "distributed", "numba", "osmium", "pettingzoo", "pytest"}
+OPTIONAL |= {"ribs", "scenariogeneration"}
 OPTIONAL |= {"traci"}  # libsumo brings it
 
 

@@ -328,7 +328,7 @@ def test_wrong_words_are_refused(
         (lambda text: text.replace("fresh,,,", "fresh,,,1.5"), "expected a whole number"),
         (lambda text: text.replace("0,random", "x,random"), "line 2 begins with 'x'"),
         (lambda text: text.replace(",held,", ",held"), f"{len(COLUMNS) - 1} cells, expected"),
-        (lambda text: text.replace("tester0,4.000", "tester0,"), "trigger_time_s is ''"),
+        (lambda text: text.replace("tester0,,,,4.000", "tester0,,,,"), "trigger_time_s is ''"),
         (lambda text: text.replace("random", "rand\xff"), None),
     ],
 )

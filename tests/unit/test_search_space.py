@@ -120,6 +120,21 @@ def test_two_that_act_together_meet_the_ego_near_each_other(space: Space) -> Non
         assert space.seen(point)[1][1].cue == "speeds up"
 
 
+@pytest.mark.parametrize(
+    ("share", "same", "beyond"), [(0.3, True, 1.6), (0.8, False, 1.6), (0.2, True, -1.6)]
+)
+def test_the_place_of_the_second_is_relative_to_the_first(
+    space: Space, share: float, same: bool, beyond: float
+) -> None:
+    """On the same side or on the other one, so far beyond it along the ego's path."""
+    point = np.full(space.dimension, 0.5)
+    point[space.index(0, "place")] = 0.3
+    point[space.index(1, "place")] = share
+    (one, _), (other, _) = space.played(point)
+    assert (one.whence == other.whence) is same
+    assert other.along - one.along == pytest.approx(beyond, abs=0.5)
+
+
 def test_an_ego_that_decides_now_and_then_has_a_phase(space: Space) -> None:
     """One number more, for the first body alone."""
     slow = dataclasses.replace(space, every=1.0)

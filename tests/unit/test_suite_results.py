@@ -92,3 +92,13 @@ def test_the_page_has_a_grid_for_each_test_in_the_order_of_the_suite() -> None:
     assert ">1 of 2, 20 km/h</td>" in page
     assert "the ego is gone" in page
     assert "No official score" in page
+
+
+def test_cases_with_a_number_alone_stand_in_lines_of_twenty() -> None:
+    """Such as draws; the corner of a grid names the parameter of its rows."""
+    rows = [dict(row(i, f"START/{i + 1}", "held")) for i in range(41)]
+    told = SuiteTold("", "", "sumo", "a.csv", {"START": ""}, {"START": ("draw",)})
+    page = suite_page(told, case_results(rows))
+    assert '<th scope="col">draw</th><th scope="col">+0</th>' in page
+    assert page.count('<th scope="row">') == 1 + 3
+    assert page.index('<th scope="row">21</th>') < page.index("START/21:")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from itertools import pairwise
 from pathlib import Path
 
 import pytest
@@ -16,6 +17,7 @@ from cavsumo.suites.cells import all_cells, selected_cells
 from cavsumo.suites.expressions import evaluated
 from cavsumo.suites.files import read_suite, suite_file, suite_names
 from cavsumo.suites.parts import suite_part
+from cavsumo.suites.street_walks import CAV_GYM, walks
 
 NAME = "euroncap-2026"
 SUITE = read_suite(suite_file(NAME))
@@ -242,3 +244,32 @@ def test_a_mistake_in_a_suite_is_one_sentence(
     file.write_text(MINE.replace(old, new), encoding="utf-8")
     with pytest.raises(InputError, match=said):
         case_plan(plan(SuiteChoice(name=str(file))), 0)
+
+
+def test_walks_are_the_same_for_a_draw_and_cross_when_the_tester_says() -> None:
+    """Of those near the ego; with election no two are on the road at once."""
+    first, again = (walks(CAV_GYM, "proximity", 3, 1) for _ in range(2))
+    assert first == again
+    assert first != walks(CAV_GYM, "proximity", 3, 2)
+    sides = [(points[0][1] > 0.0, points[-1][1] > 0.0) for points in first]
+    assert any(begins != ends for begins, ends in sides)
+    elected = walks(CAV_GYM, "election", 3, 1)
+    on_road = [[abs(y) < CAV_GYM.kerb for _, y in points] for points in elected]
+    assert all(sum(now) <= 1 for now in zip(*on_road, strict=True))
+    steps = [math.dist(a, b) for points in first for a, b in pairwise(points)]
+    assert max(steps) == pytest.approx(0.14)
+
+
+def test_a_table_of_testers_may_stand_for_several(tmp_path: Path) -> None:
+    """With their index in its expressions; a count that is no number of testers is refused."""
+    file = tmp_path / "mine.toml"
+    text = MINE.replace('body = "box"', 'body = "box"\ncount = 3')
+    text = text.replace('/ 2", y_m = -1.75', '/ 2", y_m = "index"')
+    file.write_text(text, encoding="utf-8")
+    choice = SuiteChoice(name=str(file))
+    script = case_plan(plan(choice), 0).scenario.script
+    assert script is not None
+    assert [tester.way.y_m for tester in script.testers] == [0.0, 1.0, 2.0]
+    file.write_text(text.replace("count = 3", "count = 0.5"), encoding="utf-8")
+    with pytest.raises(InputError, match=r"count: 0\.5 is no whole number from 1 to 100"):
+        case_plan(plan(choice), 0)

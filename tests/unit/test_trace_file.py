@@ -16,7 +16,7 @@ from cavsumo.errors import ResultsError
 from cavsumo.model.bodies import CAR, NOOP, PEDESTRIAN, Action, Body
 from cavsumo.model.snapshot import BodyState, Snapshot
 from cavsumo.results import trace_file
-from cavsumo.results.frame_text import frame_lines
+from cavsumo.results.frame_text import frames_text
 from cavsumo.results.trace_file import is_trace, packed, read_trace_text, trace_name, unpacked
 
 NUMBERS = st.floats(-1e9, 1e9)
@@ -109,7 +109,7 @@ def test_frames_are_what_json_makes_of_them(numbers: list[tuple[float, float]]) 
     """Character by character, for every number, for ids of all sorts and bodies that stand."""
     seen = [moment(i, x, v) for i, (x, v) in enumerate(numbers)]
     chosen = [(NOOP, Action(*pair)) for pair in numbers][:-1]
-    lines = list(frame_lines([*seen, seen[-1]], chosen))
+    lines = frames_text([*seen, seen[-1]], chosen).splitlines(keepends=True)
     for line, snapshot, actions in zip(lines, [*seen, seen[-1]], [*chosen, (), ()], strict=True):
         assert line == json.dumps(found := json.loads(line)) + "\n"
         assert list(found) == ("step time_s ego steering testers background lights actions".split())

@@ -54,6 +54,10 @@ PRECISION = 1e-2
 CLASSES = len(MIDDLES_MPS2)
 STAND, WALK = 0, 1  # an action is how much it shortens the time to the entry [timesteps]
 BEHIND_M = 5.5  # an ego whose front is so far beyond the body has passed it
+# Of the human reference driver (UN R157), as egos.reference.human: until full braking, as if it
+# came at once [s], and that [m/s2].
+HUMAN_REACTION_S, HUMAN_DECEL = 1.45, 0.774 * 9.80665
+NOTICE_BLUR_S = 0.3  # around that time a failure is preventable with some probability
 
 
 class Prices(NamedTuple):
@@ -63,11 +67,13 @@ class Prices(NamedTuple):
         held: a test that the ego passed.
         missed: no test.
         unfair: a body in the braking zone first.
+        unpreventable: a failure that a human driver would not have prevented either.
     """
 
     held: float = 1.0
     missed: float = 1.0
     unfair: float = 2.0
+    unpreventable: float = 1.0
 
 
 @dataclass(frozen=True)
@@ -78,11 +84,14 @@ class Aim:
         violation: a violation after a fair precondition; else the precondition.
         prices: of the other ends.
         confidence: of the sets around the counts; None to use the counts as they are.
+        notice: for how long a body that walks can be seen on the road before it enters the strip
+            [s]; None where every failure counts as preventable.
     """
 
     violation: bool = True
     prices: Prices = field(default_factory=Prices)
     confidence: float | None = None
+    notice: float | None = None
 
 
 def braking(v: Any) -> Any:
@@ -256,7 +265,25 @@ def _ends_inside(
     bad = ~good & ((v <= STANDING_MPS) | (after.entry < -grid.inside))
     over = early + (1.0 - early) * (good | bad)
     harmless = np.where(entering & (v <= STANDING_MPS), prices.missed, prices.held)
-    return over, early * spoilt + (1.0 - early) * bad * harmless
+    late = prices.unpreventable * (1.0 - preventable(v, -after.entry * grid.dt, aim))
+    return over, early * spoilt + (1.0 - early) * (bad * harmless + good * late)
+
+
+def preventable(v: Floats, inside: Floats, aim: Aim) -> Floats:
+    """The probability that a human driver could have stopped for a body that the ego hits.
+
+    He sees it come since it was on the road, brakes after his reaction, and is there as late as an
+    ego that drove at a constant speed.
+
+    Args:
+        v: speed of the ego at the impact [m/s].
+        inside: for how long the body has been in the strip [s].
+    """
+    if not aim.violation or aim.notice is None:
+        return np.ones_like(v)
+    needed = HUMAN_REACTION_S + v / (2.0 * HUMAN_DECEL)
+    spare = aim.notice + inside - needed
+    return np.clip(0.5 + spare / NOTICE_BLUR_S, 0.0, 1.0)
 
 
 def zeta_of(states: States, dt: float) -> Floats:

@@ -15,6 +15,7 @@ from cavsumo.cli.requests.replay import ReplayOptions
 from cavsumo.cli.steps import SlowSteps, say_written
 from cavsumo.errors import Exit, InputError
 from cavsumo.interop.fcd import write_fcd
+from cavsumo.kept.cavtest import is_cavtest, read_cavtest
 from cavsumo.network.site import Site
 from cavsumo.results.provenance import changes
 from cavsumo.results.trace_file import is_trace
@@ -52,12 +53,14 @@ def _taken(record: Record, wanted: ReplayOptions) -> tuple[Record, Trace | None,
 
     There is no trace after an error, and no place where nothing is shown.
     """
-    here = functools.partial(located, net=wanted.net, routes=wanted.routes, shown=wanted.recorded)
+    kept = is_cavtest(record.file)  # it has its files in it
+    there = functools.partial(located, net=wanted.net, routes=wanted.routes, shown=wanted.recorded)
+    here = _as_it_is if kept else there
     if wanted.recorded:
         record = here(record) if wanted.shown else record
         trace: Trace | None = _recorded_trace(record)
         site = shown_site(record.plan, trace) if wanted.shown else None
-    elif wanted.playback:
+    elif wanted.playback or kept:
         record, site = play_back(record, here, _say_changes)
         trace = record.trace
         _say(record, "the same, played back")
@@ -68,9 +71,16 @@ def _taken(record: Record, wanted: ReplayOptions) -> tuple[Record, Trace | None,
     return record, trace, site
 
 
+def _as_it_is(record: Record) -> Record:
+    """The record itself."""
+    return record
+
+
 def _found(file: Path, wanted: ReplayOptions) -> Record:
     """The episode that is meant."""
     allowed = None if wanted.trust else ()
+    if is_cavtest(file):
+        return read_cavtest(file, allowed).record
     if is_trace(file):
         return recorded_alone(file, allowed, anew=not wanted.playback)
     assert wanted.run is not None

@@ -125,7 +125,7 @@ def _add_output(group: Any) -> None:
 
 def _certify(options: argparse.Namespace) -> int:
     from cavsumo.cli.requests.certify import CertifyOptions, check_certify
-    from cavsumo.cli.setting_options import assignment
+    from cavsumo.model.checks import assignment
 
     given = values_of(options, CertifyOptions)
     given["egos"] = tuple(word for words in options.egos or () for word in words)

@@ -20,7 +20,11 @@ def add_replay(commands: Any) -> None:
         allow_abbrev=False,
     )
     add = replay.add_argument
-    add("results", type=Path, help="the CSV of a batch, or a trace (.jsonl.gz or .jsonl)")
+    add(
+        "results",
+        type=Path,
+        help="the CSV of a batch, a trace (.jsonl.gz or .jsonl), or a kept test (.cavtest)",
+    )
     add("run", type=int, nargs="?", help="number of the episode, if that is a CSV")
     add("--html", type=Path, metavar="FILE", help="write it as one page that any browser plays")
     add("--fcd", type=Path, metavar="FILE", help="write it as SUMO's floating car data")

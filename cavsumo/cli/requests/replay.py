@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from cavsumo.cli.requests.files import check_folder
+from cavsumo.cli.requests.kept import ENDING
 from cavsumo.errors import InputError, ResultsError
 from cavsumo.results.reading import read_manifest
 from cavsumo.results.trace_file import is_trace
@@ -47,14 +48,19 @@ def check_replay(file: Path, wanted: ReplayOptions) -> None:
     for option, output in (("--html", wanted.html), ("--fcd", wanted.fcd)):
         if output is not None:
             check_folder(option, output)
-    if not is_trace(file):
+    kept = file.suffix == ENDING
+    if not is_trace(file) and not kept:
         if wanted.run is None:
             raise InputError(f"replay: which run of {str(file)!r}? name its number")
         read_manifest(file)
         return
     if wanted.run is not None:
-        raise InputError(f"replay: {str(file)!r} is the trace of one episode; no run is named")
+        what = "a kept test" if kept else "the trace"
+        raise InputError(f"replay: {str(file)!r} is {what} of one episode; no run is named")
+    if kept and (wanted.net or wanted.routes):
+        raise InputError(f"replay: {str(file)!r} has its network in it; neither is named")
     try:
         file.open("rb").close()
     except OSError as error:
-        raise ResultsError(f"trace {str(file)!r}: cannot be read: {error.strerror}") from error
+        sort = "test" if kept else "trace"
+        raise ResultsError(f"{sort} {str(file)!r}: cannot be read: {error.strerror}") from error

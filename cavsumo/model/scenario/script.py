@@ -25,10 +25,11 @@ from typing import Annotated, Any, Literal, Self
 from pydantic import BaseModel, ConfigDict, Field, field_validator, model_validator
 
 from cavsumo.model.bodies import KINDS, Body, Kind
-from cavsumo.model.curve import Bend, PlaneCurve
+from cavsumo.model.curve import Bend, PlaneCurve, Pose
 from cavsumo.model.motion import Motion, Phase, motion_of, to_speed_by, to_speed_over
 from cavsumo.model.scenario.impact import Front, Straight, impact
 from cavsumo.model.scenario.sensor import Finite
+from cavsumo.model.scenario.track import Place, ScriptedTrack
 
 Length = Annotated[float, Field(gt=0, le=50, allow_inf_nan=False)]
 Speed = Annotated[float, Field(ge=0, le=100, allow_inf_nan=False)]
@@ -140,6 +141,10 @@ class Programme(ScriptPart):
     speed_mps: Speed = Field(0.0, description="before its programme begins [m/s]")
     begins: Begins | None = Field(None, description="when its stages begin; None for never")
     stages: tuple[SpeedChange, ...] = ()
+    track: ScriptedTrack | None = Field(None, description="its places, in place of all that")
+    errors_m: tuple[Place, ...] = Field(
+        (), description="of its place as the ego measures it, in each timestep from the first [m]"
+    )
 
     @cached_property
     def motion(self) -> Motion:
@@ -154,7 +159,21 @@ class Programme(ScriptPart):
     def _moves(self) -> Self:
         if bool(self.stages) != (self.begins is not None):
             raise ValueError("begins and stages go together")
+        if self.track is not None and self.model_fields_set & {"way", "speed_mps", "stages"}:
+            raise ValueError("track stands in place of way, speed_mps, begins and stages")
         return self
+
+    @property
+    def enters(self) -> tuple[Pose, float]:
+        """Its pose and its speed [m/s] when the ego enters."""
+        if self.track is not None:
+            return (*self.track.points_m[0], self.track.heading), self.track.speeds[0]
+        return (self.way.x_m, self.way.y_m, self.way.heading_rad), self.speed_mps
+
+    @property
+    def top_speed(self) -> float:
+        """Its largest speed [m/s]."""
+        return self.motion.top_speed if self.track is None else max(self.track.speeds)
 
     @property
     def body_kind(self) -> Kind:
@@ -165,7 +184,7 @@ class Programme(ScriptPart):
             length=self.length_m,
             width=self.width_m,
             wheelbase=base.wheelbase * self.length_m / base.length,
-            v_max=max(self.motion.top_speed, 0.1),
+            v_max=max(self.top_speed, 0.1),
             throttle_min=-FAST_MPS2,
             throttle_max=FAST_MPS2,
         )

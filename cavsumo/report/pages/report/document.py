@@ -17,6 +17,8 @@ from cavsumo.report.cells import TOPICS, Table, number
 from cavsumo.report.compare import WORDS, PairedComparison
 from cavsumo.report.order import Tell, untold
 from cavsumo.report.pages.report import words
+from cavsumo.report.pages.report.archive import WORDS as BANDS
+from cavsumo.report.pages.report.archive import Archive, archive
 from cavsumo.report.pages.report.links import (
     LinkedRun,
     chosen,
@@ -130,6 +132,8 @@ def page(
         curves=list(_curves(report)),
         maps=[_drawn(one, report, [*failures, *tests]) for one in maps(report, played)],
         sorts=MEANING,
+        archives=list(_archives(report, [*failures, *tests])),
+        bands=BANDS,
         failures=failures,
         tests=tests,
         totals={what: sum(getattr(one, what).count for one in report.rates) for what in COUNTED},
@@ -137,6 +141,14 @@ def page(
         several=any(group.setting for group in report.groups),
         beside=quote(folder),
     )
+
+
+def _archives(report: Report, looks: Sequence[LinkedRun]) -> Iterator[Archive]:
+    """A map of what each search has explored."""
+    runs = report.evidence.rows["run"]
+    for one in report.explored:
+        title = words.JOINT.join(word for word in (one.setting, one.agent, one.value) if word)
+        yield archive(one, title, looks, runs)
 
 
 def _shares(report: Report) -> Iterator[Plot]:

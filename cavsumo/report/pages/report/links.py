@@ -14,6 +14,7 @@ import numpy as np
 import pandas
 
 from cavsumo.batch.replay import Record
+from cavsumo.batch.shown import shown_site
 from cavsumo.errors import InputError
 from cavsumo.report.analysis import Report
 from cavsumo.report.distinct import JUDGED
@@ -23,6 +24,7 @@ from cavsumo.report.pages.replay.page import write_page
 from cavsumo.report.pages.report.scenes import BatchPlace
 from cavsumo.results.failures import ORDER, failure_kind
 from cavsumo.results.reading import inside, whole_lines
+from cavsumo.results.recorded_plan import plan_in
 from cavsumo.results.traces import read_trace
 
 FAILURES = 50  # are listed at most, or as many as there are pages
@@ -114,8 +116,12 @@ def with_pages(
     A page needs the trace, and the network as it was.
     """
     traced, several = report.evidence.rows["trace"], len(report.evidence.batches) > 1
-    here = {i for scene in scenes if scene.site is not None for i in scene.batches}
-    can = [look.index for look in looks if look.batch in here and traced[look.index]][:most]
+    shown = [scene for scene in scenes if scene.site is not None]
+    can = [
+        look.index
+        for look in looks
+        if traced[look.index] and any(scene.has(look.batch, look.run) for scene in shown)
+    ][:most]
     return [
         replace(look, page=_name(look, several)) if look.index in can else look for look in looks
     ]
@@ -127,8 +133,9 @@ def unshown(
     """Sentences that say why listed runs have no pages although there is room for more."""
     if most == 0 or sum(1 for look in looks if look.page) >= min(most, len(looks)):
         return []
-    traced, listed = report.evidence.rows["trace"], {look.batch for look in looks}
-    bare = [scene for scene in scenes if scene.site is None and listed & set(scene.batches)]
+    traced, listed = report.evidence.rows["trace"], {(look.batch, look.run) for look in looks}
+    lacking = [scene for scene in scenes if scene.site is None]
+    bare = [scene for scene in lacking if any(scene.has(*one) for one in listed)]
     said = [f"No replay pages, for lack of the network: {scene.problem}" for scene in bare]
     missing = sum(1 for look in looks[:most] if not traced[look.index])
     if missing:
@@ -161,12 +168,12 @@ def write_pages(
     except OSError as error:
         raise InputError(f"--html: {str(folder)!r}: {error.strerror}") from error
     for i in sorted({look.batch for look in wanted}):
-        scene = next(scene for scene in scenes if i in scene.batches)
         here = {str(look.run): look for look in wanted if look.batch == i}
         for _, row in whole_lines(batches[i].csv_file):
             if row is not None and row["run"] in here:
                 written += 1
                 tell("writing replay pages", f"{written} of {len(wanted)}")
+                scene = next(scene for scene in scenes if scene.has(i, int(row["run"])))
                 _write_page(here[row["run"]], row, batches[i], scene, folder)
     return written
 
@@ -177,7 +184,13 @@ def _write_page(
     """Write the page of a run."""
     assert scene.plan is not None
     assert scene.site is not None
-    plan = batch.plan.model_copy(update={"scenario": scene.plan.scenario, "suite": None})
     trace = read_trace(inside(batch.csv_file, row["trace"]))
-    record = Record(plan, row, trace, batch.manifest, batch.csv_file)
-    write_page(record, trace, scene.site, folder / look.page)
+    scenario, site = scene.plan.scenario, scene.site
+    if batch.plan.suite is not None:  # each case has a script of its own
+        own = plan_in(trace.head, f"trace of run {look.run}")
+        scenario = own.scenario.placed(scenario.places)
+        site = shown_site(own.model_copy(update={"scenario": scenario}), trace)
+    plan = batch.plan.model_copy(update={"scenario": scenario, "suite": None})
+    write_page(
+        Record(plan, row, trace, batch.manifest, batch.csv_file), trace, site, folder / look.page
+    )

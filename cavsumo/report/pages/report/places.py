@@ -92,8 +92,10 @@ class Map:
 def maps(report: Report, scenes: Sequence[BatchPlace]) -> list[Map]:
     """A map for each scene with a test of known place."""
     spots: dict[int, list[Spot]] = {}
+    runs = report.evidence.rows["run"]
     for batch, spot in _spots(report):
-        scene = next(i for i, scene in enumerate(scenes) if batch in scene.batches)
+        run = int(runs[spot.run])
+        scene = next(i for i, scene in enumerate(scenes) if scene.has(batch, run))
         spots.setdefault(scene, []).append(spot)
     return [_map(scenes[i], spots[i]) for i in sorted(spots)]
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field, replace
 from cavsumo.batch.located import located
 from cavsumo.batch.replay import Record
 from cavsumo.batch.shown import is_ours, shown_site
-from cavsumo.errors import CavsumoError, InputError
+from cavsumo.errors import CavsumoError
 from cavsumo.model.scenario import BatchPlan
 from cavsumo.network.site import Site
 from cavsumo.report.grouping import by_content
@@ -20,7 +20,7 @@ from cavsumo.suites.cases import case_plan, cases_of
 
 @dataclass(frozen=True)
 class BatchPlace:
-    """One place, of one or several batches.
+    """One place, of one or several batches, or of the cases of a suite on one network.
 
     Attributes:
         name: of its network.
@@ -28,6 +28,7 @@ class BatchPlace:
             are missing.
         problem: why they are missing, empty if not.
         batches: indices of its batches.
+        runs: numbers of its runs; None for all of its batches.
     """
 
     name: str
@@ -35,6 +36,11 @@ class BatchPlace:
     site: Site | None
     problem: str
     batches: list[int] = field(default_factory=list)
+    runs: frozenset[int] | None = None
+
+    def has(self, batch: int, run: int) -> bool:
+        """Whether a run of a batch is here."""
+        return batch in self.batches and (self.runs is None or run in self.runs)
 
 
 def scenes(batches: Sequence[Batch]) -> list[BatchPlace]:
@@ -44,34 +50,38 @@ def scenes(batches: Sequence[Batch]) -> list[BatchPlace]:
     found: dict[str, BatchPlace] = {}
     for i, batch in enumerate(batches):
         files = by_content(batch.manifest)
-        key = repr((files["plan"]["scenario"], sorted(files["sha256"].items())))
-        if key not in found:
-            found[key] = _scene(batch)
-        elif found[key].site is None:  # its files may lie beside these results
-            found[key] = replace(_scene(batch), batches=found[key].batches)
-        found[key].batches.append(i)
+        whole = repr((files["plan"]["scenario"], sorted(files["sha256"].items())))
+        for net, runs in _runs_by_net(batch).items():
+            key = f"{whole} {net}"
+            if key not in found:
+                found[key] = _scene(batch, runs)
+            elif found[key].site is None:  # its files may lie beside these results
+                found[key] = replace(_scene(batch, runs), batches=found[key].batches)
+            found[key].batches.append(i)
     return list(found.values())
 
 
-def _scene(batch: Batch) -> BatchPlace:
-    """The place of a batch: the same files, identified by their checksums."""
-    name = batch.plan.scenario.name
+def _runs_by_net(batch: Batch) -> dict[str, list[int] | None]:
+    """The runs on each network of a suite; one network with all runs for any other batch."""
+    if batch.plan.suite is None:
+        return {"": None}
     try:
-        plan = _one_place(batch.plan)
+        return {**cases_of(batch.plan).runs_by_net()}
+    except CavsumoError:  # the suite is gone, and is missed when its scene is made
+        return {"": None}
+
+
+def _scene(batch: Batch, runs: list[int] | None) -> BatchPlace:
+    """The place of some runs of a batch: the same files, identified by their checksums."""
+    name, here = batch.plan.scenario.name, None if runs is None else frozenset(runs)
+    try:
+        plan = case_plan(batch.plan, runs[0] if runs else 0)
+        name = plan.scenario.name
         record = Record(plan, {}, None, batch.manifest, batch.csv_file)
         plan = located(record, shown=True).plan
-        return BatchPlace(name, plan, shown_site(plan, _some_trace(batch)), "")
+        return BatchPlace(name, plan, shown_site(plan, _some_trace(batch)), "", runs=here)
     except CavsumoError as error:
-        return BatchPlace(name, None, None, str(error))
-
-
-def _one_place(plan: BatchPlan) -> BatchPlan:
-    """The plan of one place; raises InputError for a suite that is played on several networks."""
-    if plan.suite is not None and len(nets := cases_of(plan).nets()) > 1:
-        raise InputError(
-            f"the suite is played on {' and '.join(nets)}; cavsumo replay shows one case"
-        )
-    return case_plan(plan, 0)
+        return BatchPlace(name, None, None, str(error), runs=here)
 
 
 def _some_trace(batch: Batch) -> Trace | None:

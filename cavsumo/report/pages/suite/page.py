@@ -20,6 +20,8 @@ from cavsumo.report.suite_results import (
 )
 
 FILES = Path(__file__).parent
+SPEED, IN_LINE = "ego_kmh", 20
+CORNERS = {SPEED: "ego [km/h]"}  # parameters by their names in pages
 COLOURS = (AVOIDED, *(name for _, name in BANDS), LAST_BAND, NOT_JUDGED)
 
 
@@ -34,10 +36,13 @@ class GridCell:
 
 @dataclass(frozen=True)
 class CaseGrid:
-    """The grid of a test: a row for each speed of the ego, a column for the rest of the names."""
+    """The grid of a test: a row for each value of the first parameter in the names of its cases,
+    such as the speed of the ego, a column for the rest; lines of 20 for cases with a number alone.
+    """
 
     test: str
     title: str
+    corner: str
     result: SuiteTestResult
     columns: Sequence[str]
     rows: Sequence[tuple[str, Sequence[GridCell | None]]]
@@ -76,12 +81,24 @@ def _grid(test: str, told: SuiteTold, result: SuiteTestResult, cases: list[CaseR
     by_name: dict[str, list[CaseResult]] = {}
     for case in cases:
         by_name.setdefault(case.name, []).append(case)
-    places = {name: _place(name) for name in by_name}
+    parameters = told.named_by.get(test) or (SPEED,)
+    place = _numbered if len(parameters) == 1 and parameters != (SPEED,) else _place
+    places = {name: place(name) for name in by_name}
     rows = sorted({row for row, _ in places.values()}, key=_by_numbers)
     columns = sorted({column for _, column in places.values()}, key=_by_numbers)
     cells = {places[name]: _cell(found, told.file) for name, found in by_name.items()}
     table = [(row, [cells.get((row, column)) for column in columns]) for row in rows]
-    return CaseGrid(test, told.tests[test], result, columns, table)
+    corner = CORNERS.get(parameters[0], parameters[0])
+    return CaseGrid(test, told.tests[test], corner, result, columns, table)
+
+
+def _numbered(name: str) -> tuple[str, str]:
+    """The row and the column of a case that has a number, in lines of so many."""
+    try:
+        line, column = divmod(int(name.partition("/")[2]) - 1, IN_LINE)
+    except ValueError:
+        return _place(name)
+    return str(line * IN_LINE + 1), f"+{column}"
 
 
 def _place(name: str) -> tuple[str, str]:

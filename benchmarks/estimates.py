@@ -1,0 +1,89 @@
+"""Estimators in SUMO against plain Monte Carlo, under one exposure.
+
+The truth is a long run of Monte Carlo with its exact interval. Then each estimator is played many
+times from other seeds: its mean, how many results were refused, how often the interval meets that
+of the truth (it contains the truth itself only as well as that is known), and the gain, which is
+the variance of as many episodes of Monte Carlo over that of the estimates.
+"""
+
+from __future__ import annotations
+
+import argparse
+import math
+
+import numpy as np
+
+import cavsumo
+from cavsumo.agents.names import ESTIMATE_METHODS
+from cavsumo.probability.monte_carlo import exact_estimate
+
+NEVER = 1e-6  # a half-width that is not reached
+TRUTH_SEED, FIRST_SEED = 1, 1001
+
+
+def main() -> None:
+    """Print the truth and one row an estimator."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--net", default="crossing")
+    parser.add_argument("--ego", default="sumo")
+    parser.add_argument("--exposure", help="a TOML file; without it the default")
+    parser.add_argument("--truth", type=int, default=100_000, help="episodes")
+    parser.add_argument("--replications", type=int, default=50)
+    parser.add_argument("--episodes", type=int, default=2000, help="of an estimate")
+    parser.add_argument("--method", action="append", choices=ESTIMATE_METHODS)
+    parser.add_argument("--jobs", type=int, default=1)
+    asked = parser.parse_args()
+    truth = _estimated(asked, "monte-carlo", asked.truth, TRUTH_SEED)
+    exact = exact_estimate(truth["failures"], asked.truth, 0.05, 0.95)
+    seconds = truth["simulated_s"] / asked.truth
+    print(
+        f"truth: {exact.failures} failures in {asked.truth} episodes of {seconds:.1f} s: "
+        f"{exact.p:.3g} [{exact.lower:.3g}, {exact.upper:.3g}]"
+    )
+    print("method       mean/p  rel. sd  refused  meets  gain  said")
+    for method in asked.method or ESTIMATE_METHODS:
+        found = [
+            _estimated(asked, method, asked.episodes, FIRST_SEED + i)
+            for i in range(asked.replications)
+        ]
+        print(_row(method, found, exact.p, (exact.lower, exact.upper), asked.episodes), flush=True)
+
+
+def _estimated(
+    asked: argparse.Namespace, method: str, episodes: int, seed: int
+) -> dict[str, object]:
+    """One estimate of all its episodes, as the command prints it."""
+    found = cavsumo.estimate(
+        asked.net,
+        ego=asked.ego,
+        routes="none",
+        exposure=asked.exposure,
+        method=method,
+        half_width=NEVER,
+        max_episodes=episodes,
+        seed=seed,
+        jobs=asked.jobs,
+        trace="none",
+        progress=False,
+    )
+    return dict(found.facts)
+
+
+def _row(method: str, found: list, p: float, truth: tuple[float, float], episodes: int) -> str:
+    """The row of a method."""
+    kept = [one for one in found if one["refused"] is None]
+    estimates = np.array([one["looks"][-1]["p"] for one in found])
+    meets = [one["lower"] <= truth[1] and truth[0] <= one["upper"] for one in kept]
+    spread = float(estimates.std(ddof=1)) if len(found) > 1 else math.nan
+    gain = p * (1 - p) / episodes / spread**2 if spread else math.nan
+    said = [one["gain"]["value"] for one in kept if one["gain"]["value"] is not None]
+    mean, relative = (x / p if p else math.nan for x in (estimates.mean(), spread))
+    return (
+        f"{method:11}  {mean:6.2f}  {relative:7.2f}  {len(found) - len(kept):7}  "
+        f"{np.mean(meets) if meets else math.nan:5.2f}  {gain:4.1f}  "
+        f"{np.median(said) if said else math.nan:4.1f}"
+    )
+
+
+if __name__ == "__main__":
+    main()

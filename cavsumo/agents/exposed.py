@@ -1,0 +1,129 @@
+"""The agent whose pedestrians do what an exposure says: they arrive, look or not, and walk.
+
+An estimator in the parent process (``batch.estimating``) chooses random vectors and sends what they
+mean, so an episode is replayed without it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any, ClassVar, NamedTuple
+
+import numpy as np
+
+from cavsumo.agents.base import AGENTS, Agent
+from cavsumo.agents.names import ESTIMATE_METHODS, EXPOSURE
+from cavsumo.agents.programme import ProgrammedWalk, WalkProgramme
+from cavsumo.agents.recorded import start_of
+from cavsumo.model.bodies import Action
+from cavsumo.model.checks import choice, number
+from cavsumo.model.scene import Scene
+from cavsumo.model.snapshot import BodyState, Snapshot
+
+GREEN = "gG"
+CREEP_MPS = 1.0  # a slower ego counts as so fast
+
+
+class ExposedPedestrian(NamedTuple):
+    """A pedestrian of an exposure.
+
+    Attributes:
+        arrival_s: time that the ego has left, at its present speed, as it arrives at the kerb [s].
+        accepts: whether it then steps off, where no light says otherwise.
+        complies: whether it waits for a red light.
+        programme: how it walks.
+    """
+
+    arrival_s: float
+    accepts: bool
+    complies: bool
+    programme: WalkProgramme
+
+
+class ExposedWalk(ProgrammedWalk):
+    """One pedestrian of an exposure, in one episode; it decides once, as it arrives."""
+
+    def __init__(self, scene: Scene, index: int, walker: ExposedPedestrian | None) -> None:
+        super().__init__(scene, index, walker and walker.programme)
+        self._walker, self._stays = walker, False
+        self._light: int | None = None
+        for i, crossing in enumerate(scene.crossings):
+            inside = self._met and crossing.begin <= self._met.along <= crossing.end
+            if inside and crossing.signalled:
+                self._light = i
+
+    def _due(self, snapshot: Snapshot, state: BodyState, programme: WalkProgramme) -> bool:
+        """Whether it arrives now and steps off."""
+        walker = self._walker
+        if walker is None or self._stays or not snapshot.sees_ego:
+            return False
+        left = self._gap(snapshot, 0.0) / max(CREEP_MPS, snapshot.ego.v)
+        if left > walker.arrival_s:
+            return False
+        self._stays = not self._steps_off(snapshot, walker)
+        return not self._stays
+
+    def _steps_off(self, snapshot: Snapshot, walker: ExposedPedestrian) -> bool:
+        """The decision at the kerb."""
+        letters = snapshot.crossing_lights
+        if self._light is None or self._light >= len(letters) or not letters[self._light]:
+            return walker.accepts
+        if letters[self._light] in GREEN:
+            return True
+        return walker.accepts and not walker.complies
+
+
+@AGENTS.register(EXPOSURE)
+class ExposureAgent(Agent):
+    """Pedestrians who arrive and cross as an exposure says, to estimate how often the ego fails."""
+
+    PARAMETERS: ClassVar[Mapping[str, str]] = {
+        "method": f"estimator: {', '.join(ESTIMATE_METHODS)} (docs/probability.md)",
+        "exposure": "the exposure, a TOML file; empty for the default",
+        "half_width": "relative half-width of the interval at which to end",
+        "bound": "upper end of the interval at which to end; 0 for none",
+    }
+    FILES: ClassVar[tuple[str, ...]] = ("exposure",)
+    sees_background = False
+    drives = False
+    searches = True
+
+    def __init__(
+        self,
+        method: str = "auto",
+        exposure: str | Path = "",
+        half_width: float = 0.3,
+        bound: float = 0.0,
+    ) -> None:
+        self.method = choice("method", method, ESTIMATE_METHODS)
+        self.exposure = str(exposure)
+        self.half_width = number("half_width", half_width, 0.0)
+        if self.half_width == 0.0:
+            raise ValueError("half_width must be above 0, got 0")
+        self.bound = number("bound", bound, 0.0, 1.0)
+        self._walkers: list[ExposedPedestrian | None] = []
+
+    def reset(self, scene: Scene, owned: Sequence[int], rng: np.random.Generator) -> None:
+        super().reset(scene, owned, rng)
+        walkers = self._walkers or [None] * len(owned)
+        self._walks = [ExposedWalk(scene, i, one) for i, one in zip(owned, walkers, strict=True)]
+
+    def choose_action(self, snapshot: Snapshot) -> tuple[Action, ...]:
+        return tuple(
+            walk.action(snapshot, state)
+            for walk, state in zip(self._walks, self.own(snapshot), strict=True)
+        )
+
+    def recall(self) -> Any:
+        walkers = [
+            one and {**one._asdict(), "programme": [*one.programme]} for one in self._walkers
+        ]
+        return {"starts": self.recorded_starts, "walkers": walkers}
+
+    def remember(self, memory: Mapping[str, Any]) -> None:
+        self.recorded_starts = [start_of(start) for start in memory["starts"]]
+        self._walkers = [
+            one and ExposedPedestrian(**{**one, "programme": WalkProgramme(*one["programme"])})
+            for one in memory["walkers"]
+        ]

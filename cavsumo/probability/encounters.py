@@ -1,0 +1,129 @@
+"""Encounters of a site: a random vector says who arrives where and when, and what they do.
+
+Each body has the coordinates ``NAMES``, each uniform on [0, 1] by chance, so the density of an
+encounter under the exposure is 1 and that of a vector of another proposal is the proposal's own:
+likelihood ratios are exact.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from cavsumo.agents.programme import WalkProgramme
+from cavsumo.agents.recorded import Teams
+from cavsumo.errors import InputError, NetworkError
+from cavsumo.model.bodies import WALKING, Kind
+from cavsumo.network.pedestrian_starts import APART_M
+from cavsumo.network.recorded_starts import start_record
+from cavsumo.network.site import Site
+from cavsumo.probability.exposure import Exposure
+from cavsumo.probability.tree import Floats
+from cavsumo.searchers.places import Place
+from cavsumo.searchers.walks import walks_at
+
+NAMES = ("place", "arrival", "speed", "gap", "attention")
+ON_RED = "compliance"  # where there is a signalled crossing
+STOPS = ("hesitates", "where")  # where anybody stops on the road
+SLOWEST_MPS = 0.3
+DEPTHS_M = (-1.0, 1.0)  # where somebody stops, from the edge of the ego's strip
+
+
+@dataclass(frozen=True)
+class Encounters:
+    """The encounters of an exposure at a site.
+
+    Attributes:
+        site, places: where pedestrians arrive: all places alike.
+        kind: of the bodies.
+        teams: for each agent the indices of its bodies.
+        exposure: what they do by chance.
+        names: the coordinates of each body.
+    """
+
+    site: Site
+    places: tuple[Place, ...]
+    kind: Kind
+    teams: Teams
+    exposure: Exposure
+    names: tuple[str, ...]
+
+    @property
+    def bodies(self) -> int:
+        """The number of bodies."""
+        return sum(map(len, self.teams))
+
+    @property
+    def dimension(self) -> int:
+        """How many numbers a vector has."""
+        return self.bodies * len(self.names)
+
+    def memories(self, vector: Floats) -> tuple[dict[str, Any], ...]:
+        """The memories with which the agents of ``agents.exposed`` play a vector."""
+        size, taken = len(self.names), list[Place]()
+        bodies = []
+        for i in range(self.bodies):
+            part = vector[i * size : (i + 1) * size]
+            drawn = dict(zip(self.names, map(float, part), strict=True))
+            taken.append(self._place(drawn["place"], taken))
+            bodies.append(self._walker(drawn))
+        return tuple(
+            {
+                "starts": [list(start_record(self.site, taken[i].start)) for i in team],
+                "walkers": [bodies[i] for i in team],
+            }
+            for team in self.teams
+        )
+
+    def _walker(self, drawn: dict[str, float]) -> dict[str, Any]:
+        """The behaviour of one body."""
+        chance, top = self.exposure, self.kind.v_max
+        speed = chance.speed_mps.quantile(drawn["speed"], SLOWEST_MPS, top)
+        arrival = drawn["arrival"] * chance.arrivals.within_s
+        looks = drawn["attention"] >= chance.attention.inattentive
+        accepts = not looks or arrival >= chance.critical_gap_s.quantile(drawn["gap"])
+        return {
+            "arrival_s": arrival,
+            "accepts": accepts,
+            "complies": drawn.get(ON_RED, 1.0) >= chance.compliance.against_red,
+            "programme": list(self._programme(speed, drawn)),
+        }
+
+    def _programme(self, speed: float, drawn: dict[str, float]) -> WalkProgramme:
+        """The way across: straight, without a stop or with one."""
+        share, u = self.exposure.hesitation.share, drawn.get(STOPS[0], 1.0)
+        stops = u < share
+        pause = self.exposure.hesitation.pause_s.quantile(u / share) if stops else 0.0
+        low, high = DEPTHS_M
+        depth = low + drawn.get(STOPS[1], 0.0) * (high - low)
+        return WalkProgramme(
+            cue=0.0, speed=speed, heading=0.0, depth=depth, pause=pause, resume=None,
+            speed_2=speed, heading_2=0.0, length_2=0.0, heading_3=0.0,
+        )  # fmt: skip
+
+    def _place(self, share: float, taken: Sequence[Place]) -> Place:
+        """The place at a share of all, or the next one apart from those that are taken."""
+        count = len(self.places)
+        first = min(int(share * count), count - 1)
+        for i in range(count):
+            place = self.places[(first + i) % count]
+            here = place.start
+            if all(math.dist((here.x, here.y), (t.start.x, t.start.y)) > APART_M for t in taken):
+                return place
+        raise NetworkError(f"no room for {self.bodies} testers on the pavements: use fewer")
+
+
+def encounters_of(site: Site, kind: Kind, teams: Teams, exposure: Exposure) -> Encounters:
+    """The encounters at a site; raises InputError where the exposure has no support there."""
+    if kind.name not in WALKING:
+        raise InputError(f"exposure: kind {kind.name!r}: only {' and '.join(WALKING)}s have one")
+    try:
+        exposure.speed_mps.within(SLOWEST_MPS, kind.v_max)
+    except ValueError as error:
+        raise InputError(f"exposure: speed_mps: {error}, the speeds of a {kind.name}") from error
+    names = [*NAMES, *([ON_RED] if any(one.signalled for one in site.marked) else [])]
+    names += STOPS if exposure.hesitation.share > 0.0 else ()
+    places = walks_at(site, kind).places
+    return Encounters(site, places, kind, teams, exposure, tuple(names))

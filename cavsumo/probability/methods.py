@@ -1,0 +1,29 @@
+"""The estimators by the names under which they are chosen."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+
+import numpy as np
+
+from cavsumo.errors import InputError
+from cavsumo.probability.automatic import Automatic
+from cavsumo.probability.importance import ImportanceSampling
+from cavsumo.probability.monte_carlo import MonteCarlo
+from cavsumo.probability.protocol import FEWEST_EPISODES, Estimator, Goal
+
+PLAIN = "monte-carlo"
+ESTIMATORS: Mapping[str, Callable[[int, Goal, np.random.Generator], Estimator]] = {
+    "auto": Automatic,
+    PLAIN: MonteCarlo,
+    "importance": ImportanceSampling,
+}
+
+
+def check_episodes(method: str, episodes: int) -> None:
+    """Raise InputError where an estimator needs more episodes."""
+    if method == "importance" and episodes < FEWEST_EPISODES:
+        raise InputError(
+            f"method {method}: expected at least {FEWEST_EPISODES} episodes, got {episodes}; "
+            f"{PLAIN} takes any number"
+        )

@@ -1,0 +1,1 @@
+"""The page of a test that was made smaller: before and after side by side."""

@@ -1,0 +1,161 @@
+"""The command estimate with real SUMO: the same digits however it is played, and replays."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import pytest
+from support import rows
+
+import cavsumo
+from cavsumo.batch.estimated import estimated
+from cavsumo.cli import main
+from cavsumo.errors import Exit
+from cavsumo.report.estimates import as_json
+
+Capture = pytest.CaptureFixture[str]
+MOST = 100  # from which pilots learn
+OFTEN = "[attention]\ninattentive = 1.0\n[arrivals]\nwithin_s = 6.0\n"
+
+
+def _estimate(file: Path, *more: str, most: int = MOST) -> int:
+    words = ["estimate", "--net", "pedestrians", "--ego", "constant", "--trace", "none"]
+    words += ["--max-episodes", str(most), "--half-width", "0.05", "-o", str(file)]
+    return main([*words, *more])
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder with an exposure under which an ego that never brakes fails often."""
+    found = tmp_path_factory.mktemp("estimate")
+    (found / "often.toml").write_text(OFTEN, encoding="utf-8")
+    return found
+
+
+@pytest.fixture(scope="module")
+def found(folder: Path) -> Path:
+    """The results of an estimate."""
+    file = folder / "found.csv"
+    assert _estimate(file, "-q", "--exposure", str(folder / "often.toml")) == Exit.OK
+    return file
+
+
+def test_digits_do_not_depend_on_how_it_is_played(found: Path, folder: Path) -> None:
+    """Two at a time; and cut off in the middle of a generation and continued."""
+    often = "--exposure", str(folder / "often.toml")
+    both, parts = folder / "both.csv", folder / "parts.csv"
+    assert _estimate(both, "-q", "-j", "2", *often) == Exit.OK
+    assert rows(both) == rows(found)
+    assert _estimate(parts, "-q", *often) == Exit.OK
+    kept = parts.read_bytes().splitlines(keepends=True)[: 1 + 17]
+    parts.write_bytes(b"".join(kept))
+    assert estimated(parts).refused == "it was cut short; --resume goes on"
+    assert _estimate(parts, "-q", "--resume", *often) == Exit.OK
+    assert rows(parts) == rows(found)
+    assert as_json(estimated(parts)) == as_json(estimated(found))
+
+
+def test_a_finished_estimate_is_not_played_on(found: Path, folder: Path, capsys: Capture) -> None:
+    """Resumed with more episodes than it needed, it prints the same result."""
+    file = folder / "ended.csv"
+    often = "--exposure", str(folder / "often.toml"), "--bound", "0.9", "-q", "--json"
+    assert _estimate(file, *often, most=400) == Exit.OK
+    first = json.loads(capsys.readouterr().out)
+    assert first["ended"] == "the upper bound is at most 0.9"
+    assert first["episodes"] < 400
+    assert _estimate(file, *often, "--resume", most=400) == Exit.OK
+    assert json.loads(capsys.readouterr().out) == first
+
+
+def test_an_encounter_is_replayed_from_the_rows(found: Path, capsys: Capture) -> None:
+    """Without a trace, as the rows before it tell the estimator what to ask for."""
+    run = next(row["run"] for row in rows(found)[20:] if row["outcome"] == "violated")
+    assert main(["replay", str(found), run]) == 0
+    assert "the same" in capsys.readouterr().out
+
+
+def test_the_result_is_that_of_the_rows(found: Path, folder: Path, capsys: Capture) -> None:
+    """The share of preventable failures, an hour's number, and a picture of the looks."""
+    often, picture = folder / "often.toml", folder / "picture.svg"
+    words = "--exposure", str(often), "--method", "monte-carlo", "--picture", str(picture)
+    assert _estimate(folder / "plain.csv", *words) == Exit.OK
+    said = capsys.readouterr().out
+    failed = [r for r in rows(folder / "plain.csv") if r["grade"] and float(r["grade"]) >= 0.0]
+    assert f"an encounter: {len(failed) / MOST:.3g} [" in said
+    assert f"in an hour of exposure (60 arrivals): {60 * len(failed) / MOST:.3g} [" in said
+    assert "<svg" in picture.read_text(encoding="utf-8")
+    facts = as_json(estimated(folder / "plain.csv"))
+    assert facts["failures"] == len(failed)
+    assert facts["simulated_s"] == pytest.approx(
+        sum(float(row["time_s"]) for row in rows(folder / "plain.csv"))
+    )
+
+
+def test_no_failure_gives_a_bound(tmp_path: Path, capsys: Capture) -> None:
+    """Everybody looks and accepts long gaps alone."""
+    never = tmp_path / "never.toml"
+    gaps = '[critical_gap_s]\ndistribution = "normal"\nmean = 40\nsd = 1'
+    never.write_text(f"[attention]\ninattentive = 0.0\n{gaps}", encoding="utf-8")
+    words = "--exposure", str(never), "--method", "monte-carlo", "--bound", "0.001"
+    assert _estimate(tmp_path / "a.csv", *words, most=20) == Exit.OK
+    said = capsys.readouterr().out
+    assert "no preventable failure: at most 0.168 an encounter (95%); 3688 episodes" in said
+
+
+def test_two_egos_meet_the_same_encounters(folder: Path, capsys: Capture) -> None:
+    """Pairs of rows have the same seeds; few failures of one of them give no ratio."""
+    file, often = folder / "pair.csv", str(folder / "often.toml")
+    words = "--against", "time-gap", "--exposure", often, "--json", "-q"
+    assert _estimate(file, *words, most=30) == Exit.OK
+    said: dict[str, Any] = json.loads(capsys.readouterr().out)
+    first, second = (rows(folder / f"pair-{name}.csv") for name in ("first", "second"))
+    assert [row["seed"] for row in first] == [row["seed"] for row in second]
+    assert [one["ego"] for one in said["estimates"]] == ["constant", "time-gap"]
+    assert said["comparison"]["episodes"] == 30
+    assert "too few for a ratio" in said["comparison"]["refused"]
+
+
+def test_beside_other_agents_all_play_equally_often(tmp_path: Path) -> None:
+    """An exposure in a batch of two agents goes on after its estimate is over."""
+    words = ["run", "--net", "pedestrians", "--ego", "constant", "--testers", "1", "--runs", "25"]
+    words += ["--agent", "exposure", "--agent", "noop", "--trace", "none", "--exit-zero", "-q"]
+    words += ["--param", "bound=0.99", "--param", "method=monte-carlo"]
+    assert main([*words, "-o", str(tmp_path / "both.csv")]) == 0
+    assert [row["agent"] for row in rows(tmp_path / "both.csv")] == ["exposure", "noop"] * 25
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (["--half-width", "0"], "--half-width: expected a number above 0, got 0"),
+        (["--bound", "1.5"], "--bound: expected a probability between 0 and 1, got 1.5"),
+        (["--method", "splitting"], "argument --method: invalid choice: 'splitting'"),
+        (["--exposure", "none.toml"], "none.toml"),
+        (["--agent", "timing"], "--agent: expected none"),
+        (["--picture", "a.gif"], "--picture 'a.gif': expected a name that ends in .svg or .png"),
+        (["--against", "sumo", "--method", "importance"], "--against: needs --method monte-carlo"),
+        (["--kind", "car"], "agent exposure can only walk"),
+        (["--max-episodes", "0"], "runs"),
+        (["--method", "importance", "--max-episodes", "60"], "at least 100 episodes, got 60"),
+    ],
+)
+def test_an_estimate_that_is_impossible_is_refused(
+    words: list[str], said: str, tmp_path: Path, capsys: Capture
+) -> None:
+    """One sentence, and nothing is written."""
+    assert _estimate(tmp_path / "no.csv", "-q", *words) == Exit.USAGE
+    assert said in capsys.readouterr().err
+    assert not list(tmp_path.iterdir())
+
+
+def test_python_estimates_alike(found: Path, folder: Path) -> None:
+    """The same digits as the command; an agent cannot be chosen."""
+    how: dict[str, Any] = {"ego": "constant", "trace": "none", "progress": False}
+    how |= {"exposure": folder / "often.toml", "half_width": 0.05, "max_episodes": MOST}
+    estimation = cavsumo.estimate("pedestrians", **how)
+    assert estimation.facts == as_json(estimated(found))
+    assert str(estimation).startswith("probability of a preventable failure an encounter: ")
+    with pytest.raises(cavsumo.InputError, match="estimate: runs: expected max_episodes"):
+        cavsumo.estimate("pedestrians", runs=3, **how)
