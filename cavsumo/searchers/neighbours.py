@@ -1,9 +1,7 @@
 """Search near the best points so far: a preventable failure is rarely alone.
 
 One point is kept for each manner of moving (MAP-Elites: Mouret and Clune, arXiv 1504.04909), so
-that a manner in which the ego only ever comes close to failing does not hide the others. Points
-that did not test the ego, or unfairly, are varied only if there are no others: their neighbours
-hardly ever fail it.
+that a manner in which the ego only ever comes close to failing does not hide the others.
 """
 
 from __future__ import annotations
@@ -13,7 +11,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from cavsumo.searchers.protocol import GENERATION, TESTED_GRADE, PlayedPoint, Searcher
+from cavsumo.searchers.protocol import GENERATION, PlayedPoint, Searcher
 from cavsumo.searchers.space import Point, Space
 
 BEST, SHARE_OF_BEST = 4, 0.6  # how often one of so many best points is varied
@@ -46,8 +44,7 @@ class NeighbourSearch:
 
     def _chosen(self) -> Point:
         """The point to vary."""
-        tested = [one for one in self.best.values() if one[0] >= TESTED_GRADE]
-        ranked = sorted(tested or self.best.values(), key=lambda one: -one[0])
+        ranked = sorted(self.best.values(), key=lambda one: -one[0])
         most = BEST if self.rng.random() < SHARE_OF_BEST else len(ranked)
         return ranked[int(self.rng.integers(min(most, len(ranked))))][1]
 

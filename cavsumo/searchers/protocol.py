@@ -14,7 +14,6 @@ from cavsumo.searchers.places import Place
 from cavsumo.searchers.space import Point, Space
 
 GENERATION = 10  # points that are chosen together, before any of them is played
-TESTED_GRADE = -2.0  # from here on the ego was tested, and fairly (``results.grade``)
 LOWEST_GRADE = -5.0  # of an invalid episode (``results.grade``); from 0 on are preventable failures
 
 

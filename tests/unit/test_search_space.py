@@ -21,10 +21,9 @@ from cavsumo.network.site import Site
 from cavsumo.searchers.drives import Drives, drive_of
 from cavsumo.searchers.manoeuvres import MANOEUVRES, PAIRS, ManoeuvreSearch
 from cavsumo.searchers.methods import SEARCHERS, check_method, searcher_of
-from cavsumo.searchers.neighbours import NeighbourSearch
 from cavsumo.searchers.places import Place
 from cavsumo.searchers.portfolio import Portfolio
-from cavsumo.searchers.protocol import GENERATION, PlayedPoint, RandomSearch
+from cavsumo.searchers.protocol import GENERATION, PlayedPoint
 from cavsumo.searchers.space import FURTHER, TOGETHER, Point, Space, space_of
 from cavsumo.searchers.walks import Walks, walk_of
 from cavsumo.searchers.words import Failure, in_common
@@ -245,17 +244,6 @@ def test_what_was_good_is_looked_at_more_closely(space: Space, method: str) -> N
         searcher.tell(points, told)
         grades += [one.grade for one in told]
     assert np.mean(sorted(grades[-200:])[100:]) > np.mean(sorted(grades[:200])[100:]) + 0.03
-
-
-def test_neighbours_are_those_of_fair_tests(space: Space) -> None:
-    """Of points that nobody met, or unfairly, only while there are no others."""
-    rng = np.random.default_rng(2)
-    points = list(rng.random((10, space.dimension)))
-    searcher = NeighbourSearch(space, rng, RandomSearch(space, rng))
-    for grades in ([-3.2] * 10, [-2.4, -1.5] + [-3.2] * 8):
-        searcher.tell(points, [PlayedPoint(grade, False) for grade in grades])
-        near = [np.argmin([np.linalg.norm(one - p) for p in points]) for one in searcher.ask()]
-        assert (set(near) == {1}) is (max(grades) > -2.0)
 
 
 def test_a_portfolio_goes_on_from_what_was_found(space: Space) -> None:
