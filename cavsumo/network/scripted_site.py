@@ -15,9 +15,11 @@ from cavsumo.errors import NetworkError
 from cavsumo.model.carriageway import Limit
 from cavsumo.model.scenario import Scenario
 from cavsumo.model.scenario.script import ScriptedTest
+from cavsumo.model.surroundings import RouteLane
 from cavsumo.network.ego_routes import EgoRoute, lanes_from
 from cavsumo.network.reader import Network, driving_lanes, lane_path, read_network
 from cavsumo.network.site import Site
+from cavsumo.network.surroundings import surroundings
 
 BESIDE_M = 1.0  # the way lies no farther beside a lane where the ego enters
 
@@ -30,7 +32,9 @@ def ground(scenario: Scenario) -> Site:
     assert scenario.script is not None
     network = read_network(scenario.net_file)
     route = _route(network, scenario.ego_route, scenario.script)
-    return Site(network.file, route, network.roads(), (), network.crossing_surface())
+    near = surroundings(network, route)
+    roads = network.roads(), (), network.crossing_surface()
+    return Site(network.file, route, *roads, surroundings=near)
 
 
 def scripted_site(ground: Site, script: ScriptedTest, length: float) -> Site:
@@ -48,7 +52,10 @@ def scripted_site(ground: Site, script: ScriptedTest, length: float) -> Site:
         )
     path = curve.polyline(start - length / 2, start + lanes.length - here.along)
     route = dataclasses.replace(ground.route, depart_m=round(here.along, 3), path=path)
-    return dataclasses.replace(ground, route=route, limits=(Limit(0.0, script.ego.speed_mps),))
+    speed = script.ego.speed_mps  # the limit of all lanes, as the ego enters
+    width = min(lane.width for lane in ground.surroundings.route)
+    near = dataclasses.replace(ground.surroundings, route=(RouteLane(0.0, width, speed),))
+    return dataclasses.replace(ground, route=route, limits=(Limit(0.0, speed),), surroundings=near)
 
 
 def _route(network: Network, names: Sequence[str], script: ScriptedTest) -> EgoRoute:

@@ -169,6 +169,22 @@ def test_a_target_that_drives_into_the_standing_ego_ends_the_case(tmp_path: Path
     assert row["time_s"] < 8.0
 
 
+class Looks(Brakes):
+    """Refuses to drive where it is not told the lane of its route."""
+
+    def reset(self, scene: Any) -> None:
+        (lane,) = scene.surroundings.route
+        assert lane == (0.0, 3.5, pytest.approx(30 / 3.6))
+        assert len(scene.surroundings.lanes) == 4
+
+
+def test_an_ego_is_told_the_lane_of_a_scripted_test() -> None:
+    """Its width, and the speed of the test as its limit, as planners need them."""
+    how: dict[str, Any] = {"only": "CPFA/30/50", "progress": False, "trace": "none"}
+    (row,) = cavsumo.suite(NAME, Looks(20.0), **how).rows.to_dict("records")
+    assert row["outcome"] == "held", row["error"]
+
+
 class Steers(Brakes):
     """The same by throttle and steering: it is not held."""
 
