@@ -26,7 +26,7 @@ from cavsumo.probability.methods import ESTIMATORS
 from cavsumo.probability.protocol import Goal, PlayedVector
 from cavsumo.probability.tree import Floats
 from cavsumo.probability.weights import Estimate
-from cavsumo.results.grade import INVALID_GRADE
+from cavsumo.results.grade import graded
 from cavsumo.results.rows import cell
 
 BEYOND = 10  # vectors that are drawn together after the end of an estimate
@@ -174,6 +174,5 @@ def encounters_of_batch(prepared: PreparedBatch, label: str) -> Encounters:
 def played_vector(row: Mapping[str, Any]) -> PlayedVector:
     """The result of a vector; a row of this session and one that was recorded tell the same."""
     text = {key: cell(row[key]) for key in ("grade", "outcome", "avoidable")}
-    grade = float(text["grade"]) if text["grade"] else INVALID_GRADE
-    failed = text["outcome"] == "violated" and text["avoidable"] != "0" and grade >= 0.0
+    grade, failed = graded(text)
     return PlayedVector(failed, grade)

@@ -18,7 +18,7 @@ import numpy as np
 from cavsumo.agents.decisions import read
 from cavsumo.batch.jobs import Memory
 from cavsumo.results.alike import FEATURES, kind_of
-from cavsumo.results.grade import INVALID_GRADE
+from cavsumo.results.grade import graded
 from cavsumo.results.rows import cell
 from cavsumo.searchers.continued import ContinuedSearch
 from cavsumo.searchers.methods import searcher_of
@@ -164,8 +164,7 @@ class Searching:
     def _result(self, row: Mapping[str, Any]) -> PlayedPoint:
         """The result of a point; a row of this session and one that was recorded tell the same."""
         text = {key: cell(row[key]) for key in TOLD}
-        grade = float(text["grade"]) if text["grade"] else INVALID_GRADE
-        failed = text["outcome"] == "violated" and text["avoidable"] != "0" and grade >= 0.0
+        grade, failed = graded(text)
         kind = kind_of(text) if failed else ()
         return PlayedPoint(grade, failed, kind, tuple(read(text["situations"])))
 
