@@ -83,6 +83,14 @@ def test_early_end(play: Play) -> None:
     assert shorter < whole
 
 
+def test_searches(play: Play) -> None:
+    """A search and another agent, two seeds each."""
+    words = "--ego", "constant", "--runs", "10", "--seed", "1", "2"
+    _, _, *found = play("searches", NET, *words).splitlines()
+    assert [row.split()[1] for row in found] == ["search:portfolio", "timing"]
+    assert all(row.split()[2] in ("0/2", "1/2", "2/2") for row in found)
+
+
 def test_rare_events(play: Play) -> None:
     """Two replications of one process: the truth, and a gain."""
     _, row = play("rare_events", "--p3", "0.003", "--replications", "2").splitlines()
