@@ -20,7 +20,7 @@ from cavsumo.batch.tally import Tally
 from cavsumo.errors import InputError
 from cavsumo.kept.cavtest import is_cavtest, read_cavtest
 from cavsumo.model.objects import SentObject
-from cavsumo.model.own_folders import OwnFolder
+from cavsumo.model.own_folders import OwnFolder, close_own
 from cavsumo.model.scenario import BatchPlan, Scenario
 from cavsumo.report.files import write_report_files
 from cavsumo.report.order import ReportOptions
@@ -48,13 +48,7 @@ class TemporaryFolder:
     def __init__(self) -> None:
         own = OwnFolder("results")
         self.path = Path(own.name)
-        self.close = weakref.finalize(self, _remove, own, os.getpid())
-
-
-def _remove(own: OwnFolder, owner: int) -> None:
-    """Remove a folder, unless this process is a fork of its owner."""
-    if os.getpid() == owner:
-        own.close()
+        self.close = weakref.finalize(self, close_own, own, os.getpid())
 
 
 @dataclass(frozen=True, eq=False, repr=False)

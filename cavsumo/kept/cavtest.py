@@ -14,18 +14,15 @@ SUMO gets no input that may name files (``strangers``).
 
 from __future__ import annotations
 
-import atexit
 import dataclasses
 import hashlib
 import io
 import json
-import os
 import stat
 import zipfile
 import zlib
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass
-from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -35,7 +32,7 @@ from cavsumo.errors import InputError, ResultsError, shown
 from cavsumo.kept.strangers import check_inputs
 from cavsumo.model.checksums import checksum
 from cavsumo.model.documents import json_of
-from cavsumo.model.own_folders import OwnFolder
+from cavsumo.model.own_folders import OwnFolder, process_folder
 from cavsumo.results.inputs import FOLDER, KEPT, LARGEST, keep, kept_name
 from cavsumo.results.present import input_files
 from cavsumo.results.trace_file import packed
@@ -175,7 +172,7 @@ def unpacked(file: Path) -> Path:
     """A temporary folder of this process with the members of a test."""
     try:
         sha = hashlib.sha256(file.read_bytes()).hexdigest()
-        folder = Path(_copies().name) / sha
+        folder = process_folder("tests") / sha
         if not folder.is_dir():
             _unpack(file, folder)
     except OSError as error:
@@ -231,22 +228,3 @@ def _copy(archive: zipfile.ZipFile, member: zipfile.ZipInfo, place: Path, left: 
                 raise ValueError(f"{member.filename} holds more than {most} bytes")
             copy.write(data)
     return size
-
-
-@cache
-def _folder_of(process: int) -> OwnFolder:
-    """The temporary folder of a process, removed at its end."""
-    own = OwnFolder("tests")
-    atexit.register(_remove, own, process)
-    return own
-
-
-def _copies() -> OwnFolder:
-    """The temporary folder of this process, which may be a fork of another one."""
-    return _folder_of(os.getpid())
-
-
-def _remove(own: OwnFolder, owner: int) -> None:
-    """Remove a folder, unless this process is a fork of its owner."""
-    if os.getpid() == owner:
-        own.close()

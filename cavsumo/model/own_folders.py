@@ -10,6 +10,7 @@ marked after it is locked, so that a folder in the making, or of another program
 
 from __future__ import annotations
 
+import atexit
 import contextlib
 import fcntl
 import os
@@ -46,6 +47,28 @@ class OwnFolder:
         kill_those_with(self.name)
         shutil.rmtree(self.name, ignore_errors=True)
         os.close(self._lock)
+
+
+def process_folder(purpose: str) -> Path:
+    """The temporary folder of this process for a purpose, removed at its end.
+
+    A fork of a process has another one.
+    """
+    return Path(_folder_of(os.getpid(), purpose).name)
+
+
+@cache
+def _folder_of(process: int, purpose: str) -> OwnFolder:
+    """The folder of a process."""
+    own = OwnFolder(purpose)
+    atexit.register(close_own, own, process)
+    return own
+
+
+def close_own(own: OwnFolder, owner: int) -> None:
+    """Remove a folder, unless this process is a fork of its owner."""
+    if os.getpid() == owner:
+        own.close()
 
 
 @cache

@@ -11,19 +11,16 @@ is used only if its whole checksum is the expected one.
 
 from __future__ import annotations
 
-import atexit
 import gzip
 import hashlib
-import os
 import re
 import shutil
 import zlib
 from collections.abc import Iterator
-from functools import cache
 from pathlib import Path
 
 from cavsumo.errors import ResultsError, plain
-from cavsumo.model.own_folders import OwnFolder
+from cavsumo.model.own_folders import process_folder
 from cavsumo.results.trace_file import is_trace
 
 FOLDER = "inputs"
@@ -95,7 +92,7 @@ def unpacked(folder: Path, sha: str) -> Path | None:
     kept = _kept(folder, sha)
     if kept is None:
         return None
-    place = Path(_copies().name) / sha
+    place = process_folder("inputs") / sha
     name = KEPT.fullmatch(kept.name)
     assert name is not None
     file = place / (name["stem"] + name["endings"])
@@ -138,22 +135,3 @@ def _content(file: Path) -> Iterator[bytes]:
             if size > LARGEST:
                 raise ValueError(f"it holds more than {LARGEST // 2**20} MiB")
             yield data
-
-
-@cache
-def _folder_of(process: int) -> OwnFolder:
-    """The temporary folder of a process, removed at its end."""
-    own = OwnFolder("inputs")
-    atexit.register(_remove, own, process)
-    return own
-
-
-def _copies() -> OwnFolder:
-    """The temporary folder of this process, which may be a fork of another one."""
-    return _folder_of(os.getpid())
-
-
-def _remove(own: OwnFolder, owner: int) -> None:
-    """Remove a folder, unless this process is a fork of its owner."""
-    if os.getpid() == owner:
-        own.close()
