@@ -9,6 +9,7 @@ and begins to gain speed again. Reactions are read from nothing but the speed th
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 
 from cavsumo.agents.triggers import MAX_DECEL, REACTION_TIME
 from cavsumo.model.snapshot import Snapshot
@@ -17,6 +18,7 @@ Cue = float | str
 BRAKES, SPEEDS_UP = "brakes", "speeds up"
 REACTIONS = (BRAKES, SPEEDS_UP)
 
+LONGEST_WAIT_S = 8.0  # a body that waits for the ego goes on after this time
 # Changes of speed that are a reaction [m/s]: more than SUMO's drivers dawdle in a timestep.
 LOST_MPS, GAINED_MPS = 0.8, 0.5
 
@@ -74,3 +76,37 @@ class Awaited:
         if self._at == math.inf and reactions.now == self.reaction:
             self._at = time
         return time >= self._at + self.delay - 1e-9
+
+
+class Pause:
+    """The time from standing until going on, in one episode.
+
+    Args:
+        least: how long a body stands at least [s].
+        resume: it stands on until this cue; None: no longer.
+    """
+
+    def __init__(self, least: float, resume: Cue | None) -> None:
+        self.least, self.resume = least, resume
+        self._begun: float | None = None
+        self._awaited: Awaited | None = None
+
+    def over(self, snapshot: Snapshot, reactions: EgoReactions, gap: Callable[[], float]) -> bool:
+        """Whether the body goes on; the pause begins with the first question.
+
+        ``gap``: asked for the gap that the ego has left as they meet [m].
+        """
+        resume, time = self.resume, snapshot.time
+        if self._begun is None:
+            self._begun = time
+            if isinstance(resume, str):
+                self._awaited = Awaited(resume)
+        reacted = self._awaited is not None and self._awaited.came(reactions, time)
+        waited = time - self._begun
+        if waited < self.least - 1e-9:
+            return False
+        if resume is None or waited >= LONGEST_WAIT_S:
+            return True
+        if isinstance(resume, str):
+            return reacted
+        return gap() <= zone_m(resume, snapshot.ego.v)

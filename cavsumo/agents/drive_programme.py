@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 
-from cavsumo.agents.cues import Awaited, EgoReactions, in_phase, zone_m
+from cavsumo.agents.cues import Awaited, EgoReactions, Pause, in_phase, zone_m
 from cavsumo.agents.driving import extent, within_turn
 from cavsumo.agents.manoeuvres import Driver, EgoPrediction
 from cavsumo.agents.programmed_manoeuvres import (
@@ -22,41 +22,11 @@ from cavsumo.model.bodies import Action, clamped
 from cavsumo.model.scene import Scene
 from cavsumo.model.snapshot import BodyState, Snapshot
 
-LONGEST_STAND_S = 8.0  # a vehicle that waits for the ego goes on after this time
 SIDEWAYS_MPS2 = 5.0  # largest acceleration sideways: half of what dry tyres hold
 LATE_S = (
     0.3  # a vehicle that would come so much later than its cue says drives up to the line first
 )
 AT_LINE_M = 1.0  # a vehicle so near to its line waits there
-
-
-class Pause:
-    """The time from standing until going on, in one episode."""
-
-    def __init__(self, programme: DriveProgramme) -> None:
-        self.programme = programme
-        self.begun: float | None = None
-        self._awaited: Awaited | None = None
-
-    def over(self, snapshot: Snapshot, reactions: EgoReactions, gap: float) -> bool:
-        """Whether it goes on; the pause begins with the first question.
-
-        ``gap``: that the ego has left as they meet [m].
-        """
-        programme, time = self.programme, snapshot.time
-        if self.begun is None:
-            self.begun = time
-            if isinstance(programme.resume, str):
-                self._awaited = Awaited(programme.resume)
-        reacted = self._awaited is not None and self._awaited.came(reactions, time)
-        waited = time - self.begun
-        if waited < programme.pause - 1e-9:
-            return False
-        if programme.resume is None or waited >= LONGEST_STAND_S:
-            return True
-        if isinstance(programme.resume, str):
-            return reacted
-        return gap <= zone_m(programme.resume, snapshot.ego.v)
 
 
 class ProgrammedDrive:
@@ -72,7 +42,7 @@ class ProgrammedDrive:
         self._reactions = EgoReactions()
         self._approach, self._late = approach, False
         if programme is not None:
-            self._pause = Pause(programme)
+            self._pause = Pause(programme.pause, programme.resume)
             cue = programme.cue
             self._awaited = Awaited(cue, programme.delay) if isinstance(cue, str) else None
 
@@ -95,10 +65,11 @@ class ProgrammedDrive:
             return driver.idle(snapshot, state, hurry=self._late)
         legs = driver.manoeuvre
         assert isinstance(legs, Legs)
-        if legs.stands and not legs.second:
-            gap = self._gap(snapshot, state)
-            if self._pause.over(snapshot, self._reactions, gap):
-                legs.go_on()
+        stands = legs.stands and not legs.second
+        if stands and self._pause.over(
+            snapshot, self._reactions, lambda: self._gap(snapshot, state)
+        ):
+            legs.go_on()
         wanted = driver.act(snapshot, state)
         natural = wanted._replace(throttle=max(-programme.braking, wanted.throttle))
         return within_turn(clamped(natural, state.body.kind), state, SIDEWAYS_MPS2)

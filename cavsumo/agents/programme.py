@@ -11,7 +11,7 @@ import math
 from typing import NamedTuple
 
 from cavsumo.agents.avoidance import Avoidance
-from cavsumo.agents.cues import Awaited, Cue, EgoReactions, in_phase, zone_m
+from cavsumo.agents.cues import Awaited, Cue, EgoReactions, Pause, in_phase, zone_m
 from cavsumo.agents.legs import WalkLeg, walk_time
 from cavsumo.agents.planning.coordinates import meeting
 from cavsumo.agents.walking import ApproachKerb, stopping_speed, walk
@@ -20,7 +20,6 @@ from cavsumo.model.kinematics import wrap
 from cavsumo.model.scene import Scene
 from cavsumo.model.snapshot import BodyState, Snapshot
 
-LONGEST_WAIT_S = 8.0  # a body that waits for the ego on the road goes on after this time
 STOPPED_M = 0.05  # so near to the end of its leg a body has arrived
 ROUND_M = 2.0  # that a body's course is longer for turning and stopping
 BEYOND_M = 0.6  # so far beyond the edge of the carriageway a body stops
@@ -76,10 +75,12 @@ class ProgrammedWalk:
         self._idle = ApproachKerb(scene, index)
         self._avoidance = Avoidance(scene, index)
         self._phase = 0  # before, first leg, pause, second leg, last leg, gone
-        self._since = 0.0  # when the pause began [s]
         self._from = (0.0, 0.0)  # where the second leg began
         self._reactions = EgoReactions()
-        self._awaited = _awaited(programme.cue, programme.delay) if programme else None
+        if programme is not None:
+            cue = programme.cue
+            self._awaited = Awaited(cue, programme.delay) if isinstance(cue, str) else None
+            self._pause = Pause(programme.pause, programme.resume)
         if self._met is not None:
             _, _, ahead = scene.ego_path.at(self._met.along)
             self._side = math.copysign(1.0, math.sin(ahead - self._met.way.heading))
@@ -137,9 +138,10 @@ class ProgrammedWalk:
         if self._phase == 0 and self._due(snapshot, state, programme):
             self._phase = 1
         if self._phase == 1 and self._to_go(state, programme) <= STOPPED_M * programme.stops:
-            self._phase, self._since = 2, snapshot.time
-            self._awaited = _awaited(programme.resume)
-        if self._phase == 2 and self._goes_on(snapshot, state, programme):
+            self._phase = 2
+        if self._phase == 2 and self._pause.over(
+            snapshot, self._reactions, lambda: self._gap_at_entry(snapshot, state, programme)
+        ):
             self._phase, self._from = 3, (state.x, state.y)
         if self._phase == 3 and math.dist(self._from, (state.x, state.y)) >= programme.length_2:
             self._phase = 4
@@ -164,11 +166,11 @@ class ProgrammedWalk:
         """Whether the body steps off now."""
         if not snapshot.sees_ego:
             return False
-        if isinstance(programme.cue, str):
-            assert self._awaited is not None
+        if self._awaited is not None:
             return self._awaited.came(self._reactions, snapshot.time)
-        assert self._met is not None
         met = self._met
+        assert met is not None
+        assert not isinstance(programme.cue, str)
         left = max(0.0, met.strip - met.way.progress(state.x, state.y))
         entry, shift = entry_of(programme, left, state.body.kind)
         v = snapshot.ego.v
@@ -177,23 +179,16 @@ class ProgrammedWalk:
             snapshot.time, programme.phase, programme.every, self.scene.dt
         )
 
-    def _goes_on(self, snapshot: Snapshot, state: BodyState, programme: WalkProgramme) -> bool:
-        """Whether the pause is over."""
-        waited = snapshot.time - self._since
-        reacted = self._awaited is None or self._awaited.came(self._reactions, snapshot.time)
-        if waited < programme.pause - 1e-9:
-            return False
-        if programme.resume is None or waited >= LONGEST_WAIT_S:
-            return True
-        if isinstance(programme.resume, str):
-            return reacted
+    def _gap_at_entry(
+        self, snapshot: Snapshot, state: BodyState, programme: WalkProgramme
+    ) -> float:
+        """The gap that the ego has left as the last legs enter its strip [m]."""
         met = self._met
         assert met is not None
-        v, along = snapshot.ego.v, self.scene.ego_path.project(state.x, state.y).along
+        along = self.scene.ego_path.project(state.x, state.y).along
         left = max(0.0, met.strip - met.way.progress(state.x, state.y))
         entry, shift = walk_time(_last_legs(programme), left, state.body.kind) or (0.0, 0.0)
-        gap = self._gap(snapshot, along - met.along + shift) - v * entry
-        return gap <= zone_m(programme.resume, v)
+        return self._gap(snapshot, along - met.along + shift) - snapshot.ego.v * entry
 
     def _gap(self, snapshot: Snapshot, shift: float) -> float:
         """Distance from the ego's front to the body, so far beyond its meeting point [m]."""
@@ -222,8 +217,3 @@ def _last_legs(programme: WalkProgramme) -> list[WalkLeg]:
     """The legs after the pause."""
     second = WalkLeg(programme.speed_2, programme.heading_2, programme.length_2)
     return [second, WalkLeg(programme.speed_2, programme.heading_3, math.inf)]
-
-
-def _awaited(cue: Cue | None, delay: float = 0.0) -> Awaited | None:
-    """The reaction to be awaited for a cue; None for any other cue."""
-    return Awaited(cue, delay) if isinstance(cue, str) else None
