@@ -1,11 +1,11 @@
 """Searches beside testers that do not learn: preventable failures found a second, on places.
 
     python benchmarks/searches.py NET... [--ego EGO] [--tester search:portfolio --tester timing ...]
-        [--runs 150] [--seed 1 2 3] [--impact 2] [-j 1]
+        [--runs 150] [--testers 1] [--seed 1 2 3] [--impact 2] [-j 1]
 
-Every search has one pedestrian, every other agent three, as the commands ``search`` and ``run``
-have by default; no traffic, reference ``human``. ``seeds``: those with a preventable failure of at
-least ``impact`` m/s. ``distinct``: kinds of preventable failures by impact speed, side and place.
+Every search has ``testers`` pedestrians, every other agent three as by default; no traffic,
+reference ``human``. ``seeds``: those with a preventable failure of at least ``impact`` m/s.
+``distinct``: kinds of preventable failures by impact speed, side and place.
 Failures in 1000 simulated seconds have an interval of 95 % of Poisson's distribution; the failures
 of one search depend on each other, so it is too narrow for a search.
 """
@@ -37,10 +37,14 @@ def main() -> None:
     parser.add_argument("--tester", action="append", default=[], help="an agent, or search:METHOD")
     parser.add_argument("--runs", type=int, default=150)
     parser.add_argument("--seed", type=int, nargs="+", default=[1, 2, 3])
+    parser.add_argument("--testers", type=int, default=1, help="of a search")
     parser.add_argument("--impact", type=float, default=0.0)
     parser.add_argument("-j", "--jobs", type=int, default=1)
     options = parser.parse_args()
-    print(f"ego {options.ego}, {options.runs} episodes a seed, seeds {options.seed}\n{HEAD}")
+    searched = f"searches with {options.testers} testers"
+    print(
+        f"ego {options.ego}, {options.runs} episodes for each of {options.seed}, {searched}\n{HEAD}"
+    )
     for net in options.nets:
         for tester in options.tester or ["search:portfolio", "timing"]:
             print(_line(net, tester, options), flush=True)
@@ -71,7 +75,7 @@ def _played(net: Path, tester: str, seed: int, options: argparse.Namespace) -> p
     agent, _, method = tester.partition(":")
     how: dict[str, Any] = {"agents": [agent]}
     if method:
-        how |= {"testers": 1, "params": {"search.method": method}}
+        how |= {"testers": options.testers, "params": {"search.method": method}}
     return cavsumo.run(
         net, routes="none", ego=options.ego, runs=options.runs, seed=seed, trace="none",
         jobs=options.jobs, progress=False, **how,

@@ -22,11 +22,15 @@ THROUGH: Range = (0.98, 1.0)
 LATE: Range = (0.15, 0.5)  # as an ego that did not react before could hardly stop
 EARLY: Range = (0.2, 1.0)
 SHORT: Range = (0.1, 0.4)  # as an ego that keeps its speed could not stop any more
+TIMED: Range = (0.65, 0.75)  # as an ego that reacts at once can just stop
 SOON: Range = (0.1, 0.7)  # of vehicles, that late
 ON: Range = (ON_SHARE, 1.0)  # without a stop
 
 # For each manoeuvre the ranges of some coordinates of ``walks.Walks`` and ``drives.Drives``.
 WALKS: Mapping[str, Mapping[str, Range]] = {
+    "crosses in time": {
+        "zone": TIMED, "speed": (0.95, 1.0), "heading": STRAIGHT, "depth": THROUGH,
+    },
     "crosses": {"zone": LATE, "speed": (0.5, 1.0), "heading": STRAIGHT, "depth": THROUGH},
     "crosses slowly": {"zone": LATE, "speed": (0.0, 0.35), "heading": STRAIGHT, "depth": THROUGH},
     "comes towards": {"zone": LATE, "speed": (0.0, 0.6), "heading": (0.0, 0.35), "depth": THROUGH},

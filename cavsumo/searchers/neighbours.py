@@ -15,6 +15,7 @@ from cavsumo.searchers.protocol import GENERATION, PlayedPoint, Searcher
 from cavsumo.searchers.space import Point, Space
 
 BEST, SHARE_OF_BEST = 4, 0.6  # how often one of so many best points is varied
+SHARE_OF_FAILED = 0.7  # how often a preventable failure is varied, if there is one
 SPREAD = 0.08  # typical step of a number
 SHARE = 0.4  # of the numbers change
 
@@ -44,6 +45,9 @@ class NeighbourSearch:
 
     def _chosen(self) -> Point:
         """The point to vary."""
+        failed = [point for grade, point in self.best.values() if grade >= 0.0]
+        if failed and self.rng.random() < SHARE_OF_FAILED:
+            return failed[int(self.rng.integers(len(failed)))]
         ranked = sorted(self.best.values(), key=lambda one: -one[0])
         most = BEST if self.rng.random() < SHARE_OF_BEST else len(ranked)
         return ranked[int(self.rng.integers(min(most, len(ranked))))][1]
