@@ -70,6 +70,7 @@ DRIVES: Mapping[str, Mapping[str, Range]] = {
 # By the name of the movements.
 MANOEUVRES: Mapping[str, Mapping[str, Mapping[str, Range]]] = {"walks": WALKS, "drives": DRIVES}
 
+APART: Mapping[str, Range] = {"company": (ALONE, TOGETHER), "reaction": (0.0, AS_IT_BRAKES)}
 # Two that act together: ranges of the first and of the second.
 NEAR: Mapping[str, Range] = {"company": (TOGETHER, 1.0), "reaction": (0.0, AS_IT_BRAKES)}
 BEHIND: Mapping[str, Range] = {**NEAR, "place": (0.28, 0.36)}  # on the same side, 1 to 3.5 m on
@@ -101,7 +102,7 @@ PRIOR = 0.2  # value of a manoeuvre of which nothing is known
 
 @dataclass
 class ManoeuvreSearch:
-    """Each point one of the known manoeuvres for each body, or a pair for the first two.
+    """Each point a known manoeuvre, of each body at a place of its own, or a pair of two.
 
     First each in turn; then those more often that came nearer to a preventable failure.
     """
@@ -135,7 +136,7 @@ class ManoeuvreSearch:
             drawn_as = "pair", number
         else:
             number = self._next("single", len(known), turn // 2 if bodies > 1 else turn)
-            chosen = [known[(number + i) % len(known)] for i in range(bodies)]
+            chosen = [known[number], *[{**APART, **known[number]}] * (bodies - 1)]
             drawn_as = "single", number
         point = self.rng.random(self.space.dimension)
         for i, ranges in enumerate(chosen):
