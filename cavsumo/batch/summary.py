@@ -211,7 +211,12 @@ def _say_drive(one: Ended, console: Console) -> None:
 
 
 def _say_bound(ended: Sequence[Ended], console: Console) -> None:
-    """Print the bound where no failure was found; unpreventable ones apart."""
+    """Print the bound where no failure was found; unpreventable ones apart.
+
+    Tests that a search chose prove none.
+    """
+    if any(one.searches for one in ended):
+        return
     together, judged = found_by(one.tally.all for one in ended), _judged(ended)
     if not together.tests or together.preventable or together.not_judged:
         return
