@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import re
 import xml.etree.ElementTree as ET
 from collections.abc import Sequence
@@ -12,6 +13,7 @@ import pytest
 from report_files import FAILED, HELD, NOTHING, UNFAIR, judged, write
 
 from cavsumo.batch.ended import Ended
+from cavsumo.batch.searching import SearchFacts
 from cavsumo.batch.sentences import exit_reason
 from cavsumo.batch.stopping import stopping_rule
 from cavsumo.batch.summary import summarise
@@ -103,6 +105,17 @@ def test_no_preventable_failure_has_its_bound(
     assert "no preventable" not in shown(batch(tmp_path / "b.csv", [*held, [FAILED]]), capsys)
     none = shown(batch(tmp_path / "c.csv", held, "none"), capsys)
     assert "\nno failure in 9 tests: at most" in none
+
+
+def test_tests_that_a_search_chose_have_no_bound(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """The search says itself what its random points prove."""
+    found = SearchFacts(9, 90.0, 0, 0, None, "", 0, 0.5)
+    one = dataclasses.replace(batch(tmp_path / "a.csv", [[HELD]] * 9), searches={"search": found})
+    said = shown(one, capsys)
+    assert "search: no preventable failure in 9 episodes" in said
+    assert "at most" not in said
 
 
 def test_exit_status_1_says_what_it_stands_for(tmp_path: Path) -> None:
