@@ -8,8 +8,9 @@ Plays the same points in turns, to their ends and cut, and compares what a searc
 from __future__ import annotations
 
 import argparse
-import resource
 from typing import Any
+
+from branching import processor_time
 
 import cavsumo
 
@@ -21,7 +22,7 @@ LEARNED = (
 
 def played(net: str, cut: bool, options: argparse.Namespace) -> tuple[Any, float]:
     """The rows of a search, and the processor time [s]."""
-    before = _spent()
+    before = processor_time()
     results = cavsumo.run(
         net,
         routes=options.routes,
@@ -35,13 +36,7 @@ def played(net: str, cut: bool, options: argparse.Namespace) -> tuple[Any, float
         jobs=1,
         progress=False,
     )
-    return results.rows, _spent() - before
-
-
-def _spent() -> float:
-    """Processor time of this process and of those that ended [s]."""
-    both = (resource.getrusage(who) for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN))
-    return sum(used.ru_utime + used.ru_stime for used in both)
+    return results.rows, processor_time() - before
 
 
 def line(net: str, options: argparse.Namespace) -> str:

@@ -27,6 +27,8 @@ from pathlib import Path
 from typing import Any
 from unittest import mock
 
+from branching import processor_time
+
 from cavsumo.batch import episode_server
 from cavsumo.batch.episode_runner import EpisodeRunner
 from cavsumo.batch.episode_server import EpisodeServer
@@ -142,12 +144,6 @@ def time_of(worker: Worker) -> float:
     stat = Path(f"/proc/{worker._process.pid}/stat").read_text(encoding="ascii")
     ticks = stat.rpartition(")")[2].split()[11:15]
     return sum(map(int, ticks)) / os.sysconf("SC_CLK_TCK")
-
-
-def processor_time() -> float:
-    """Of this process and its children that have ended [s]."""
-    uses = map(resource.getrusage, (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN))
-    return sum(use.ru_utime + use.ru_stime for use in uses)
 
 
 def timed(work: Any) -> float:

@@ -13,15 +13,16 @@ of one search depend on each other, so it is too narrow for a search.
 from __future__ import annotations
 
 import argparse
-import resource
 from pathlib import Path
 from typing import Any
 
 import pandas as pd
+from branching import processor_time
 from scipy.stats import chi2
 
 import cavsumo
 from cavsumo.results.alike import FEATURES, kind_of
+from cavsumo.results.failures import PREVENTABLE, failure_kind
 
 HEAD = (
     f"{'place':26} {'tester':18} {'seeds':>7} {'preventable':>11} {'distinct':>8} {'others':>6} "
@@ -52,9 +53,9 @@ def main() -> None:
 
 def _line(net: Path, tester: str, options: argparse.Namespace) -> str:
     """One row of the table: the batches of all seeds."""
-    before = _spent()
+    before = processor_time()
     batches = [_played(net, tester, seed, options) for seed in options.seed]
-    cpu, rows = _spent() - before, pd.concat(batches)
+    cpu, rows = processor_time() - before, pd.concat(batches)
     failures = [_preventable(batch) for batch in batches]
     hard = sum((found["impact_speed_mps"] >= options.impact).any() for found in failures)
     count, seconds = sum(map(len, failures)), float(rows["time_s"].sum())
@@ -84,7 +85,7 @@ def _played(net: Path, tester: str, seed: int, options: argparse.Namespace) -> p
 
 def _preventable(rows: pd.DataFrame) -> pd.DataFrame:
     """The preventable failures among rows."""
-    return rows[(rows["outcome"] == "violated") & (rows["avoidable"] == 1)]
+    return rows[[failure_kind(row) == PREVENTABLE for row in rows.to_dict("records")]]
 
 
 def _kinds(failures: pd.DataFrame) -> int:
@@ -96,12 +97,6 @@ def _poisson(count: int) -> tuple[float, float]:
     """An exact interval of 95 % for the mean of a Poisson variable."""
     low = float(chi2.ppf(0.025, 2 * count)) / 2.0 if count else 0.0
     return low, float(chi2.ppf(0.975, 2 * count + 2)) / 2.0
-
-
-def _spent() -> float:
-    """Processor time of this process and of those that ended [s]."""
-    both = (resource.getrusage(who) for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN))
-    return sum(used.ru_utime + used.ru_stime for used in both)
 
 
 if __name__ == "__main__":

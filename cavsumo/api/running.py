@@ -85,7 +85,7 @@ def search(
 
     Args:
         net: see ``run``.
-        method: of the search: portfolio, random, manoeuvres, neighbours, cma (docs/search.md).
+        method: of the search, by its name (docs/search.md).
         **arguments: those of ``run``; there is one tester unless ``testers`` says otherwise.
 
     Returns and raises as ``run``.

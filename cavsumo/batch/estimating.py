@@ -26,7 +26,7 @@ from cavsumo.probability.methods import ESTIMATORS
 from cavsumo.probability.protocol import Goal, PlayedVector
 from cavsumo.probability.tree import Floats
 from cavsumo.probability.weights import Estimate
-from cavsumo.results.grade import graded
+from cavsumo.results.failures import graded
 from cavsumo.results.rows import cell
 
 BEYOND = 10  # vectors that are drawn together after the end of an estimate
@@ -173,6 +173,5 @@ def encounters_of_batch(prepared: PreparedBatch, label: str) -> Encounters:
 
 def played_vector(row: Mapping[str, Any]) -> PlayedVector:
     """The result of a vector; a row of this session and one that was recorded tell the same."""
-    text = {key: cell(row[key]) for key in ("grade", "outcome", "avoidable")}
-    grade, failed = graded(text)
+    grade, failed = graded(row)
     return PlayedVector(failed, grade)

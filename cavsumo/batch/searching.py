@@ -18,15 +18,13 @@ import numpy as np
 from cavsumo.agents.decisions import read
 from cavsumo.batch.jobs import Memory
 from cavsumo.results.alike import FEATURES, kind_of
-from cavsumo.results.grade import graded
+from cavsumo.results.failures import graded
 from cavsumo.results.rows import cell
 from cavsumo.searchers.continued import ContinuedSearch
 from cavsumo.searchers.methods import searcher_of
 from cavsumo.searchers.protocol import PlayedPoint, PointSpace
 from cavsumo.searchers.space import Point, Space
 from cavsumo.searchers.words import Failure, in_common
-
-TOLD = ("grade", "outcome", "avoidable", "tester", "situations", *FEATURES)  # columns
 
 
 @dataclass(frozen=True)
@@ -163,10 +161,9 @@ class Searching:
 
     def _result(self, row: Mapping[str, Any]) -> PlayedPoint:
         """The result of a point; a row of this session and one that was recorded tell the same."""
-        text = {key: cell(row[key]) for key in TOLD}
-        grade, failed = graded(text)
-        kind = kind_of(text) if failed else ()
-        return PlayedPoint(grade, failed, kind, tuple(read(text["situations"])))
+        grade, failed = graded(row)
+        kind = kind_of({key: cell(row[key]) for key in FEATURES}) if failed else ()
+        return PlayedPoint(grade, failed, kind, tuple(read(cell(row["situations"]))))
 
     def _failure(self, number: int) -> Failure:
         """The body that the ego failed in an episode."""

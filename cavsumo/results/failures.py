@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from typing import Any, TypeVar
 
+from cavsumo.results.grade import INVALID_GRADE
 from cavsumo.results.rows import cell, is_failure
 
 PREVENTABLE, NOT_JUDGED, UNPREVENTABLE = "preventable", "not judged", "unpreventable"
@@ -30,6 +31,13 @@ def failure_kind(row: Mapping[str, Any]) -> str:
     if not said:
         return NOT_JUDGED
     return PREVENTABLE if float(said) == 1.0 else UNPREVENTABLE
+
+
+def graded(row: Mapping[str, Any]) -> tuple[float, bool]:
+    """The grade of a row, and whether it is a preventable failure or one that nobody judged."""
+    said = cell(row["grade"])
+    found = float(said) if said else INVALID_GRADE
+    return found, failure_kind(row) in (PREVENTABLE, NOT_JUDGED) and found >= 0.0
 
 
 def preventable_first(rows: Iterable[AnyRow]) -> list[AnyRow]:

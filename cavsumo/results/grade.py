@@ -22,7 +22,6 @@ needs to stop, and one beside the ego that touches it, both leave no time.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
 from cavsumo.assertions.contacts import STANDING_MPS
@@ -55,12 +54,6 @@ def grade(episode: Episode, avoidability: Avoidability | None) -> float:
     if said.verdict == UNFAIR:
         return -2.0 - _share(MOST_S if episode.short is None else episode.short)
     return -3.0 - _share(_spare(episode))
-
-
-def graded(row: Mapping[str, str]) -> tuple[float, bool]:
-    """The grade of a row, as text of its cells, and whether it is a preventable failure."""
-    found = float(row["grade"]) if row["grade"] else INVALID_GRADE
-    return found, row["outcome"] == VIOLATED and row["avoidable"] != "0" and found >= 0.0
 
 
 def _share(seconds: float) -> float:

@@ -151,10 +151,6 @@ class Space:
         """Where a body starts."""
         return self.played(point)[body][0]
 
-    def seen(self, point: Point) -> list[tuple[Place, Programme]]:
-        """Places and programmes of the bodies that take part."""
-        return [(place, programme) for place, programme in self.played(point) if programme]
-
     def covered(self, points: Sequence[Point]) -> float:
         """The share of coarse cells (place, side, moment, speed) of the first body with a point."""
         stretches = {(p.whence, p.along // STRETCH_M) for p in self.movements.places}

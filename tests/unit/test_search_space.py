@@ -31,6 +31,11 @@ from cavsumo.searchers.words import Failure, in_common
 SIDES = (False, True)  # from the right, from the left
 
 
+def seen(space: Space, point: Point) -> list[tuple[Place, Any]]:
+    """Places and programmes of the bodies that take part."""
+    return [(place, programme) for place, programme in space.played(point) if programme]
+
+
 @pytest.fixture
 def space(staged: Callable[..., tuple[BatchPlan, Site]]) -> Space:
     """Two pedestrians on the straight road."""
@@ -54,12 +59,12 @@ def test_a_point_is_starts_and_programmes(space: Space) -> None:
     first, second = space.memories(point)
     assert len(first["starts"]) == len(second["starts"]) == 1
     assert first["programmes"] == second["programmes"]
-    assert programme_of(first["programmes"][0]) == space.seen(point)[0][1]
+    assert programme_of(first["programmes"][0]) == seen(space, point)[0][1]
     (x, y), (u, v) = (memory["starts"][0][:2] for memory in (first, second))
     assert math.dist((x, y), (u, v)) > 1.2  # the place was taken
     point[space.index(1, "company")] = 0.2
     assert space.memories(point)[1]["programmes"] == [None]
-    assert len(space.seen(point)) == 1
+    assert len(seen(space, point)) == 1
 
 
 def test_every_number_of_a_point_has_a_body_and_a_name(space: Space) -> None:
@@ -111,13 +116,13 @@ def test_two_that_act_together_meet_the_ego_near_each_other(space: Space) -> Non
         point = rng.random(space.dimension)
         point[space.index(1, "company")] = 0.8
         point[space.index(1, "reaction")] = 0.1
-        (one, first), (other, second) = space.seen(point)
+        (one, first), (other, second) = seen(space, point)
         assert abs(one.along - other.along) <= 8.0
         assert abs(first.cue - second.cue) <= 0.5
         point[space.index(1, "reaction")] = 0.7
-        assert space.seen(point)[1][1].cue == "brakes"
+        assert seen(space, point)[1][1].cue == "brakes"
         point[space.index(1, "reaction")] = 0.9
-        assert space.seen(point)[1][1].cue == "speeds up"
+        assert seen(space, point)[1][1].cue == "speeds up"
 
 
 @pytest.mark.parametrize(
@@ -141,7 +146,7 @@ def test_an_ego_that_decides_now_and_then_has_a_phase(space: Space) -> None:
     assert slow.dimension == space.dimension + 1
     point = np.full(slow.dimension, 0.5)
     point[slow.index(0, "phase")] = 0.3
-    (_, first), (_, second) = slow.seen(point)
+    (_, first), (_, second) = seen(slow, point)
     assert (first.every, first.phase) == (1.0, 0.3)
     assert second.every == 0.0
 
@@ -194,7 +199,7 @@ def test_a_memory_of_vehicles_is_plain_data(drives: Space) -> None:
     """The same programmes again after a way through JSON."""
     point = np.random.default_rng(4).random(drives.dimension)
     point[drives.index(1, "company")] = 0.5
-    for memory, (_, programme) in zip(drives.memories(point), drives.seen(point), strict=True):
+    for memory, (_, programme) in zip(drives.memories(point), seen(drives, point), strict=True):
         (plain,) = json.loads(json.dumps(memory))["programmes"]
         assert programme_of(plain) == programme
 
