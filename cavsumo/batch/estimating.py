@@ -25,6 +25,7 @@ from cavsumo.probability.exposure import exposure_of
 from cavsumo.probability.methods import ESTIMATORS
 from cavsumo.probability.protocol import Goal, PlayedVector
 from cavsumo.probability.tree import Floats
+from cavsumo.probability.vehicle_encounters import VehicleEncounters
 from cavsumo.probability.weights import Estimate
 from cavsumo.results.failures import graded
 from cavsumo.results.rows import cell
@@ -138,7 +139,7 @@ class Estimating:
             seconds=math.fsum(self._lasted.values()),
             errors=len(self._errors),
             gain=self._estimator.gain(),
-            per_hour=self.encounters.exposure.arrivals.per_hour,
+            per_hour=self.encounters.per_hour,
         )
 
     def _number(self, run: int) -> int:
@@ -164,7 +165,7 @@ class Estimating:
         return self._rng.random((BEYOND, self.encounters.dimension))
 
 
-def encounters_of_batch(prepared: PreparedBatch, label: str) -> Encounters:
+def encounters_of_batch(prepared: PreparedBatch, label: str) -> Encounters | VehicleEncounters:
     """The encounters of an agent; raises InputError where its exposure has no support."""
     scenario, member = prepared.plan.scenario, prepared.cast[label]
     kind, exposure = kind_named(scenario.kind), exposure_of(member.params)
