@@ -22,7 +22,7 @@ from cavsumo.batch.prepared import PreparedBatch
 from cavsumo.model.bodies import kind_named
 from cavsumo.probability.encounters import Encounters, encounters_of
 from cavsumo.probability.exposure import exposure_of
-from cavsumo.probability.methods import ESTIMATORS
+from cavsumo.probability.methods import estimator
 from cavsumo.probability.protocol import Goal, PlayedVector
 from cavsumo.probability.tree import Floats
 from cavsumo.probability.vehicle_encounters import VehicleEncounters
@@ -88,8 +88,8 @@ class Estimating:
         goal = Goal(plan.runs, agent.half_width, agent.bound or None)
         seed = np.random.SeedSequence([plan.seed, zlib.crc32(EXPOSURE.encode())])
         self._rng = np.random.default_rng(seed)
-        make = ESTIMATORS[agent.method]
-        self._estimator = make(self.encounters.dimension, goal, self._rng)
+        found = self.encounters
+        self._estimator = estimator(agent.method, found.dimension, goal, self._rng, found.cuts)
         self.vectors: list[Floats] = []
         self._generation = range(0)  # episodes of the vectors that were asked for last
         self._told: dict[int, PlayedVector] = {}

@@ -41,7 +41,7 @@ class NoisyProcess(Protocol):
         """How near each state is to a failure, on any scale that increases."""
 
     def features(self, states: Floats) -> Floats:
-        """What a proposal may depend on, about in [-1, 1], shape (n, features)."""
+        """The numbers that a proposal may depend on, about in [-1, 1], shape (n, features)."""
 
 
 class SteppedEstimate(NamedTuple):

@@ -102,12 +102,15 @@ def test_rare_events(play: Play) -> None:
 def test_estimators(play: Play) -> None:
     """Two replications of each method on each function; probabilities are known."""
     _, *found = play("estimators", "--replications", "2", "--episodes", "200").splitlines()
-    assert [row.split()[2] for row in found[:5]] == [
-        "auto", "monte-carlo", "importance", "sobol", "subset",
+    assert [row.split()[2] for row in found[:6]] == [
+        "auto", "monte-carlo", "stratified", "importance", "sobol", "subset",
     ]  # fmt: skip
+    words = "--replications", "2", "--half-width", "5", "--method", "monte-carlo"
+    _, early = play("estimators", *words, "--function", "corners").splitlines()
+    assert float(early.split()[7]) < 2000
     assert {row.split()[0]: row.split()[1] for row in found} == {
         "corner": "1.0e-04", "corners": "1.0e-03", "ball": "1.2e-04", "scattered": "1.0e-03",
-        "pedestrian": found[-1].split()[1],
+        "pedestrian": found[-7].split()[1], "lights": "2.1e-03",
     }  # fmt: skip
 
 
