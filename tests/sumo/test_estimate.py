@@ -181,7 +181,7 @@ def test_vehicles_meet_the_ego(kind: str, tmp_path: Path, capsys: Capture) -> No
     assert "violated" in met["1.0"]
     run = str(met["1.0"].index("violated"))
     assert main(["replay", str(tmp_path / "1.0.csv"), run]) == Exit.OK
-    assert "identical" in capsys.readouterr().out
+    assert "frames: the same" in capsys.readouterr().out
 
 
 @pytest.mark.parametrize(
