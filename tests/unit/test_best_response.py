@@ -50,6 +50,7 @@ def small(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(solving, "ROLLOUTS", 10)
     for module in (grid, moves, solving):
         monkeypatch.setattr(module, "ZETAS", ZETAS[::3])
+    for module in (grid, solving):
         monkeypatch.setattr(module, "SPEEDS", SPEEDS[::2])
 
 
