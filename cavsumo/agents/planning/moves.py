@@ -1,4 +1,4 @@
-"""What a timestep of the model of a best response leads to, and what its ends cost the tester.
+"""A timestep of the model of a best response, and the prices of its ends for the tester.
 
 Outcomes have prices: the tester earns 0 for its aim and minus a price otherwise.
 """
