@@ -136,7 +136,7 @@ class Reductions:
     def retimed(self, candidate: Candidate) -> Iterator[Candidate]:
         """Fewer testers, or no background, the testers earlier or later.
 
-        Without somebody for whom it braked, the ego comes at another time.
+        An ego that no longer brakes for somebody comes at another time.
         """
         fewer = [one for one in self.testers(candidate) if one.cost < candidate.cost]
         for smaller in (*fewer, *itertools.islice(self.background(candidate), 1)):
