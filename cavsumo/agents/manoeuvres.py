@@ -248,12 +248,17 @@ class Driver:
 
     def begin(self, state: BodyState) -> bool:
         """Begin the manoeuvre; False when there is none, it is too late, or it has begun before."""
-        if self.manoeuvre is None or self._begun or not self.manoeuvre.possible(state):
+        if not self.can_begin(state):
             return False
+        assert self.manoeuvre is not None
         self.manoeuvre.begin(state)
         self.course = self.manoeuvre.course  # cutting in leads to another
         self.active = self._begun = True
         return True
+
+    def can_begin(self, state: BodyState) -> bool:
+        """Whether there is a manoeuvre, it has not begun before, and it is not too late for it."""
+        return self.manoeuvre is not None and not self._begun and self.manoeuvre.possible(state)
 
     def over(self, state: BodyState) -> bool:
         """Whether the manoeuvre has ended."""

@@ -14,17 +14,28 @@ from typing import NamedTuple
 
 from cavsumo.agents.cues import Cue
 from cavsumo.agents.driving import BRAKING_MPS2, HASTE_MPS2, Course, stopping_from
-from cavsumo.agents.manoeuvres import ARRIVED_M, Brake, CutIn, MakeManoeuvre, Run
+from cavsumo.agents.manoeuvres import (
+    ARRIVED_M,
+    Brake,
+    CutIn,
+    EgoPrediction,
+    MakeManoeuvre,
+    Run,
+)
+from cavsumo.agents.triggers import MAX_DECEL
 from cavsumo.model.bodies import Action
 from cavsumo.model.carriageway import Approach
 from cavsumo.model.scene import Scene
 from cavsumo.model.snapshot import BodyState
+from cavsumo.model.zone_presence import drift
 
 SLOW_MPS = 0.05  # a vehicle so slow stands
 HARD_MPS2 = 8.0  # brake with all effort; without any driving.BRAKING_MPS2
 GENTLE_MPS2 = 1.0  # throttle without effort; with all of it driving.HASTE_MPS2
 CHANGE_S = (1.8, 1.0)  # the pursued point of a change of lanes, without and with all effort
 NEAREST_M = 5.0  # that point is no nearer
+SAME_MPS = 0.3  # an ego faster by no more than this follows
+FOLLOWING_S = 3.0  # if it is so near
 ENDED_S = 3.0  # it drives lawfully so long after it went on
 
 
@@ -101,9 +112,15 @@ class ProgrammedRun(Legs, Run):
         self.gaining, self._depth, self._pause = programme.gaining, programme.depth, programme.pause
         self._hesitates = programme.hesitates
         self._from_rest: tuple[float, float] | None = None
+        self._last: tuple[BodyState, tuple[float, float]] | None = None
 
     def arrival(self, state: BodyState) -> tuple[float, float]:
         """As of any run; of one that hesitates with its stop, after which it goes on."""
+        if self._last is None or self._last[0] is not state:  # it is asked for twice
+            self._last = state, self._arrival(state)
+        return self._last[1]
+
+    def _arrival(self, state: BodyState) -> tuple[float, float]:
         if self._depth is None or not self._hesitates or self.stands:
             return super().arrival(state)
         stop = max(self.approach.enter + self._depth, self.approach.wait)
@@ -126,7 +143,15 @@ class ProgrammedRun(Legs, Run):
         return self.course.drive(state, allowed, gaining=self.gaining)
 
 
-class ProgrammedBrake(Legs, Brake):
+class Followed(Legs):
+    """A manoeuvre ahead of an ego that comes closer, or that follows already."""
+
+    def followed(self, ego: EgoPrediction, state: BodyState, gap: float) -> bool:
+        """Whether the ego comes no closer to a vehicle at a gap [m]."""
+        return ego.v <= state.v + SAME_MPS and 0.0 < gap <= FOLLOWING_S * ego.v
+
+
+class ProgrammedBrake(Followed, Brake):
     """Brakes ahead of the ego, to a stand or to a speed, and goes on."""
 
     def __init__(
@@ -135,6 +160,11 @@ class ProgrammedBrake(Legs, Brake):
         super().__init__(scene, approach, course)
         self._programme = programme
         self._wanted = programme.speed if programme.depth is None else 0.0
+
+    def gap(self, ego: EgoPrediction, state: BodyState) -> tuple[float, float] | None:
+        """The present one, as the stopping zones count it."""
+        rear = self.course.place(state)[0] - state.body.kind.length / 2
+        return rear + drift(state.v, ego.v, MAX_DECEL) - ego.front, ego.v
 
     def act(self, state: BodyState, others: Iterator[BodyState]) -> Action:
         programme, dt = self._programme, self.scene.dt
@@ -149,7 +179,7 @@ class ProgrammedBrake(Legs, Brake):
         return self.standing > ENDED_S
 
 
-class ProgrammedCutIn(Legs, CutIn):
+class ProgrammedCutIn(Followed, CutIn):
     """Changes into the ego's lane at a speed, then goes on at another or stops for a while."""
 
     def __init__(
