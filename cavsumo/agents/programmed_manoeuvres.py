@@ -33,6 +33,7 @@ SLOW_MPS = 0.05  # a vehicle so slow stands
 HARD_MPS2 = 8.0  # brake with all effort; without any driving.BRAKING_MPS2
 GENTLE_MPS2 = 1.0  # throttle without effort; with all of it driving.HASTE_MPS2
 CHANGE_S = (1.8, 1.0)  # the pursued point of a change of lanes, without and with all effort
+CHANGING = 0.7  # share of its speed that it keeps at least until it has changed
 NEAREST_M = 5.0  # that point is no nearer
 SAME_MPS = 0.3  # an ego faster by no more than this follows
 FOLLOWING_S = 3.0  # if it is so near
@@ -180,17 +181,18 @@ class ProgrammedBrake(Followed, Brake):
 
 
 class ProgrammedCutIn(Followed, CutIn):
-    """Changes into the ego's lane at a speed, then goes on at another or stops for a while."""
+    """Changes into the ego's lane, brakes there to a speed or to a stand, and goes on."""
 
     def __init__(
         self, scene: Scene, approach: Approach, course: Course, programme: DriveProgramme
     ) -> None:
         super().__init__(scene, approach, course)
-        self._programme = programme
+        self._programme, self._changing = programme, 0.0
 
     def begin(self, state: BodyState) -> None:
         super().begin(state)
-        top = max(self._programme.speed, self._programme.speed_2)
+        self._changing = max(CHANGING * state.v, self._programme.speed)
+        top = max(self._changing, self._programme.speed_2)
         self.course = Course(self.course.path, state.body.kind, self.scene.dt, top)
 
     def act(self, state: BodyState, others: Iterator[BodyState]) -> Action:
@@ -210,10 +212,11 @@ class ProgrammedCutIn(Followed, CutIn):
 
     def _wanted(self) -> float:
         """The speed of the present leg [m/s]."""
+        if not self.arrived:
+            return self._changing
         if self.second:
             return self._programme.speed_2
-        stops = self.arrived and self._programme.depth is not None
-        return 0.0 if stops else self._programme.speed
+        return self._programme.speed if self._programme.depth is None else 0.0
 
 
 MANOEUVRES = (ProgrammedRun, ProgrammedBrake, ProgrammedCutIn)

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import dataclasses
 import math
 from collections.abc import Callable, Iterator
+from pathlib import Path
 
 import pytest
 
@@ -64,6 +66,45 @@ def entered(
     raise AssertionError("it never came")
 
 
+@pytest.fixture
+def two_lanes(staged: Callable[..., tuple[BatchPlan, Site]], networks: dict[str, Path]) -> Site:
+    """Cars on a road with a lane beside the ego's."""
+    road = networks["crossing"].with_name("proving-road.net.xml")
+    return staged(kind="car", net=road)[1]
+
+
+def test_a_vehicle_beside_cuts_in_and_stops(two_lanes: Site) -> None:
+    """It keeps its speed beside the ego, changes lanes without stopping, and brakes in the lane."""
+    site = two_lanes
+    (approach,) = (a for a in site.approaches if a.type == "adjacent")
+    programme = RUN._replace(cue=0.5, speed=1.0, depth=0.0, pause=5.0)
+    beside, changing, within = list[float](), list[float](), list[float]()
+    for *_, vehicle in driven(site, approach, programme, 2.0, 11.0):
+        off = abs(site.route.path.project(vehicle.x, vehicle.y).lateral)
+        group = beside if off > 3.0 else changing if off > 0.3 else within
+        group.append(vehicle.v)
+    assert len(beside) > 50
+    assert min(beside[:-10]) == pytest.approx(beside[0])
+    assert min(changing) >= 0.65 * beside[0]
+    assert min(within) == pytest.approx(0.0, abs=0.1)
+
+
+def test_a_lane_not_yet_beside_the_ego_is_no_place_to_cut_in(two_lanes: Site) -> None:
+    """The vehicle drives on to where the lanes run side by side, at its speed."""
+    site = two_lanes
+    (approach,) = (a for a in site.approaches if a.type == "adjacent")
+    later = dataclasses.replace(approach, enter=250.0)
+    programme, begun = RUN._replace(cue=20.0, speed=6.0), list[float]()
+    for *_, vehicle in driven(site, later, programme, -2.0, 11.0):
+        off = abs(site.route.path.project(vehicle.x, vehicle.y).lateral)
+        along = later.path.project(vehicle.x, vehicle.y).along
+        if off < 3.0:
+            begun.append(along)
+        elif along < 249.0:
+            assert vehicle.v > 5.0
+    assert begun[0] > 250.0
+
+
 def crossing(site: Site) -> list[Approach]:
     """The ways from the side."""
     turns = [
@@ -92,7 +133,7 @@ def test_a_vehicle_comes_into_the_way_with_its_phase(site: Site, phase: float) -
         programme = RUN._replace(every=1.0, phase=phase)
         time, zone = entered(site, approach, programme, 2.0)
         assert abs(math.remainder(time - phase, 1.0)) <= 0.2
-        assert abs(zone - programme.cue) < 1.1
+        assert abs(zone - 0.5) < 1.1
 
 
 def test_a_vehicle_ahead_brakes_though_the_ego_keeps_its_distance(site: Site) -> None:
