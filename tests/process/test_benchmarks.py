@@ -152,6 +152,15 @@ def test_ast_crosswalk(play: Play) -> None:
     assert all("of 50" in line and line.endswith("alike 1") for line in lines)
 
 
+def test_crosswalks(play: Play) -> None:
+    """One estimate by each method on a starting point, with a truth that is given."""
+    words = "start-2", "--counted", "107", "10000", "--runs", "200", "--replications", "2"
+    truth, _, *found = play("crosswalks", *words).splitlines()
+    assert truth.startswith("start-2: 107 failures in 10000 episodes: 0.0107 [")
+    assert [row.split()[0] for row in found] == ["shifts", "splitting"]
+    assert all(numbers(row)[5] > 1000 for row in found)
+
+
 def test_street_suites(play: Play) -> None:
     """One draw of each tester and number of pedestrians in one suite."""
     lines = play("street_suites", "--suite", "chance-2019", "--draws", "1", "-j", "1").splitlines()
