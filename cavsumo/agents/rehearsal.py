@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from dataclasses import replace
 
 from cavsumo.agents.story_conditions import BoardView
 from cavsumo.agents.storyboard import StoryRun
@@ -29,7 +30,7 @@ def nominal_contact(script: ScriptedTest, until: float) -> float:
     """
     story, nearest, where = StoryRun(script, STEP_S), math.inf, 0.0
     for step in range(int(until / STEP_S)):
-        view = _view(script, story, step * STEP_S)
+        view = view_of(script, story, step * STEP_S)
         story.advance(view)
         ego = view.states[EGO].box
         apart = min(gap(ego, state.box) for name, state in view.states.items() if name != EGO)
@@ -40,7 +41,7 @@ def nominal_contact(script: ScriptedTest, until: float) -> float:
     return where
 
 
-def _view(script: ScriptedTest, story: StoryRun, time: float) -> BoardView:
+def view_of(script: ScriptedTest, story: StoryRun, time: float) -> BoardView:
     """All bodies at a time."""
     approach, v = script.ego, script.ego.speed_mps
     assert approach.length_m is not None
@@ -61,6 +62,4 @@ def _view(script: ScriptedTest, story: StoryRun, time: float) -> BoardView:
 
 def _boxed(length: float, width: float) -> Body:
     """A body of the ego's box."""
-    from dataclasses import replace
-
     return Body(EGO, replace(CAR, length=length, width=width))

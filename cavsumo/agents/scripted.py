@@ -77,7 +77,7 @@ class ScriptedAgent(Agent):
 
 
 def seen_in(story: StoryRun, script: ScriptedTest, snapshot: Snapshot, front: float) -> BoardView:
-    """What a storyboard's conditions look at."""
+    """The state of a timestep for the conditions of a storyboard."""
     ego, testers = snapshot.ego, snapshot.testers
     states = {EGO: ego} | {f"tester{i}": state for i, state in enumerate(testers)}
     gone = {body.id: body.along(snapshot.time)[0] for body in story.bodies}
@@ -101,8 +101,12 @@ def front_of_ego(script: ScriptedTest, scene: Scene, snapshot: Snapshot) -> floa
     half = ego.body.kind.length / 2
     axle = approach.axle(ego.body.kind.length)
     back = axle - half  # of the point that follows the way, from the centre
-    here = scene.ego_path.project(ego.x - back * math.cos(ego.o), ego.y - back * math.sin(ego.o))
-    return approach.start_m - half + here.along + axle
+    x, y = ego.x - back * math.cos(ego.o), ego.y - back * math.sin(ego.o)
+    along = scene.ego_path.project(x, y).along
+    if along == 0.0:  # the path begins at the ego's centre, and an axle is behind that
+        x0, y0, o = scene.ego_path.at(0.0)
+        along = (x - x0) * math.cos(o) + (y - y0) * math.sin(o)
+    return approach.start_m - half + along + axle
 
 
 @dataclass

@@ -24,7 +24,7 @@ TOUCHING_M = 1e-9
 
 
 class BoardView(NamedTuple):
-    """What conditions look at in one timestep.
+    """The state of a timestep, as conditions need it.
 
     Attributes:
         time: since the ego entered [s].
@@ -43,7 +43,7 @@ class BoardView(NamedTuple):
 
 
 class BoardState(Protocol):
-    """What a storyboard tells of itself."""
+    """A storyboard, as its conditions see it."""
 
     variables: dict[str, str]
 

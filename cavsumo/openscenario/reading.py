@@ -24,7 +24,7 @@ STEP_S = 0.02  # a timestep, unless the user gives another
 
 @dataclass(frozen=True)
 class ScenarioSource:
-    """What is to be played.
+    """A scenario that is to be played.
 
     Attributes:
         file: the scenario's.

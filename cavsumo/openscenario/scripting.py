@@ -37,7 +37,7 @@ def script_of(
         board: the element Storyboard, with the parameters of the scenario.
         ground: on which it is played.
     """
-    read = _Reader(ego, step, beginnings, board, ground)
+    read = _BoardReader(ego, step, beginnings, board, ground)
     names = [one for one in beginnings.entities if one != ego]
     actions, events = read.story(names)
     if actions.deleted:  # without them, bodies have other numbers
@@ -67,7 +67,7 @@ def script_of(
         raise InputError(f"{board.xml.file!r}: {first_problem(error)}") from error
 
 
-class _Reader:
+class _BoardReader:
     """Reads the storyboard for some of the entities."""
 
     def __init__(

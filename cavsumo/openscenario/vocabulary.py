@@ -188,7 +188,7 @@ class Known(NamedTuple):
 
 @cache
 def vocabulary() -> dict[str, Known]:
-    """What is understood, by the names of the elements."""
+    """The elements that are understood, by their names."""
     found = {}
     for line in LINES.strip().splitlines():
         head, _, inner = line.partition("|")
@@ -236,4 +236,10 @@ def check_root(root: XmlElement) -> XmlElement:
     return root
 
 
-__all__ = ["WITHOUT_EFFECT", "check_root", "check_understood", "vocabulary"]
+def markdown_table() -> str:
+    """The table of the documentation: elements, their attributes, and what may be in them."""
+    lines = ["| element | attributes | in it |", "| --- | --- | --- |"]
+    for tag, known in vocabulary().items():
+        inner = "not looked at" if known.inner is None else ", ".join(known.inner)
+        lines.append(f"| `{tag}` | {', '.join(known.attributes)} | {inner} |")
+    return "\n".join(line.replace("|  |", "| |").replace("|  |", "| |") for line in lines)
