@@ -511,14 +511,22 @@ def test_the_tables_of_the_experiments(
     assert (tmp_path / "agency.csv").is_file() == (name == "tables")
 
 
+@pytest.mark.parametrize(
+    ("drivers", "driver"),
+    [("faulty_drivers", "SeesTheNearestOnly"), ("other_drivers", "YieldsToOne")],
+)
 def test_scores_against_faulty_drivers(
-    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], tmp_path: Path
+    drivers: str,
+    driver: str,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+    tmp_path: Path,
 ) -> None:
     """One driver, ten episodes of a search and of timing; the table once more from the file."""
     monkeypatch.syspath_prepend(str(ROOT / "experiments" / "search"))
     monkeypatch.setenv("PYTHONPATH", "")
     file = str(tmp_path / "trials.jsonl")
-    words = ["--driver", "SeesTheNearestOnly", "--seed", "1", "--episodes", "10", "-j", "1"]
+    words = ["--drivers", drivers, "--driver", driver, "--seed", "1", "--episodes", "10", "-j", "1"]
     monkeypatch.setattr(sys, "argv", ["score.py", *words, "--net", "pedestrians", "-o", file])
     script("search/score").main()
     table = capsys.readouterr().out
@@ -527,7 +535,7 @@ def test_scores_against_faulty_drivers(
     assert last.startswith("timing: a faulty driver failed in ")
     assert " of 1 trials" in last
     trials = [json.loads(line) for line in Path(file).read_text(encoding="utf-8").splitlines()]
-    assert [(t["driver"], t["testers"]) for t in trials] == [("SeesTheNearestOnly", 2)] * 2
+    assert [(t["driver"], t["testers"]) for t in trials] == [(driver, 2)] * 2
     monkeypatch.setattr(sys, "argv", ["score.py", "--read", file])
     script("search/score").main()
     assert capsys.readouterr().out == table
