@@ -21,8 +21,8 @@ from pathlib import Path
 from cavsumo import __version__
 from cavsumo.interop.head import head_of
 from cavsumo.interop.lanelets import CROSSING, PAVEMENT, Strip, strips
-from cavsumo.interop.openscenario import TEST, Place, write_all
-from cavsumo.interop.tracks import Moment, Stays, Track, stays
+from cavsumo.interop.openscenario import TEST, ExportPlace, write_all
+from cavsumo.interop.tracks import Stays, Track, TrackPoint, stays
 from cavsumo.model.bodies import BICYCLE, BUS, PEDESTRIAN
 from cavsumo.model.polyline import Point
 from cavsumo.network.drawing.surfaces import credit
@@ -42,7 +42,7 @@ ON_FOOT = {PAVEMENT, CROSSING}
 HEAD_COMMENT = re.compile(r"<!-- cavsumo\.head (.*?) -->", re.DOTALL)
 
 
-def write_commonroad(trace: Trace, place: Place, folder: Path, way: str) -> None:
+def write_commonroad(trace: Trace, place: ExportPlace, folder: Path, way: str) -> None:
     """Write ``test.xml`` into a folder; ``way`` is RECORDED or TEST.
 
     Raises InputError when the file cannot be made.
@@ -114,7 +114,7 @@ def _add_location(root: ET.Element, net: Path) -> None:
         _add(more, "scaling", 1.0)
 
 
-def _lines(place: Place, bodies: Sequence[Stays]) -> list[list[Point]]:
+def _lines(place: ExportPlace, bodies: Sequence[Stays]) -> list[list[Point]]:
     """The lines near which lanelets are told."""
     tracks = [track for body in bodies if body.part != "background" for track in body.tracks]
     return [list(place.path.points), *([(one.x, one.y) for one in track] for track in tracks)]
@@ -157,7 +157,7 @@ def _add_obstacle(root: ET.Element, number: int, shape: Shape, track: Track, dt:
             _add_state(way, "state", one, dt)
 
 
-def _add_state(parent: ET.Element, name: str, one: Moment, dt: float) -> ET.Element:
+def _add_state(parent: ET.Element, name: str, one: TrackPoint, dt: float) -> ET.Element:
     """A body at a time step."""
     state = ET.SubElement(parent, name)
     _add_point(ET.SubElement(state, "position"), one.x, one.y)
@@ -167,7 +167,7 @@ def _add_state(parent: ET.Element, name: str, one: Moment, dt: float) -> ET.Elem
     return state
 
 
-def _add_problem(root: ET.Element, ego: Stays, place: Place, dt: float) -> None:
+def _add_problem(root: ET.Element, ego: Stays, place: ExportPlace, dt: float) -> None:
     """The ego's planning problem: from its first state to the end of its route."""
     problem = ET.SubElement(root, "planningProblem", id=str(PROBLEM))
     begin = _add_state(problem, "initialState", ego.tracks[0][0], dt)

@@ -18,7 +18,7 @@ KEPT = ("row", "plan", "sha256", "versions", "sumo_options", "starts")
 
 
 def head_of(trace: Trace, way: str) -> dict[str, Any]:
-    """What is said of an episode; ``way``: as recorded or as a test."""
+    """The settings of an episode; ``way``: as recorded or as a test."""
     head = {key: trace.head[key] for key in KEPT if key in trace.head}
     scenario = dict(head["plan"]["scenario"])
     scenario |= {key: PurePath(scenario[key]).name for key in FILES if scenario.get(key)}

@@ -27,7 +27,7 @@ from cavsumo.results.traces import FORMATS, Shape, Trace, parsed
 LARGEST_B = 1 << 26
 PER_MOMENT = 3  # points of a trajectory for each moment: just before, at and after it
 NO_PLAN = "it was not exported by cavsumo: its settings are missing"
-Place = tuple[float, float, float, float, float]  # time [s], x, y [m], speed [m/s], heading [rad]
+Pose = tuple[float, float, float, float, float]  # time [s], x, y [m], speed [m/s], heading [rad]
 
 
 class _Body(NamedTuple):
@@ -35,7 +35,7 @@ class _Body(NamedTuple):
 
     part: str
     shape: Shape
-    places: list[Place]
+    places: list[Pose]
 
 
 def read_exported(file: Path) -> Trace:

@@ -34,7 +34,7 @@ from cavsumo.interop.storyboard_parts import (
     position,
     standing_speed,
 )
-from cavsumo.interop.tracks import Moment, Stays, at_axle, driven, moved, set_off, stays
+from cavsumo.interop.tracks import Stays, TrackPoint, at_axle, driven, moved, set_off, stays
 from cavsumo.model.polyline import Path as Polyline
 from cavsumo.network.drawing.surfaces import credit
 from cavsumo.results.traces import Trace
@@ -49,7 +49,7 @@ WAYPOINTS_M = 20.0  # from one to the next
 HALF = 0.5  # of a timestep before its first frame a body enters, and stands there
 
 
-class Place(NamedTuple):
+class ExportPlace(NamedTuple):
     """The place of an episode.
 
     Attributes:
@@ -63,7 +63,7 @@ class Place(NamedTuple):
     horizon: float
 
 
-def write_openscenario(trace: Trace, place: Place, folder: Path, way: str = RECORDED) -> None:
+def write_openscenario(trace: Trace, place: ExportPlace, folder: Path, way: str = RECORDED) -> None:
     """Write ``test.xosc`` and ``test.xodr`` into a folder.
 
     Args:
@@ -107,7 +107,7 @@ def _library() -> Any:
     return xosc
 
 
-def _scenario(xosc: Any, trace: Trace, place: Place, way: str, notice: str) -> Any:
+def _scenario(xosc: Any, trace: Trace, place: ExportPlace, way: str, notice: str) -> Any:
     """The scenario; ``notice``: the attribution that the map's licence requires."""
     bodies, end = stays(trace), float(trace.frames[-1]["time_s"])
     entities, init = xosc.Entities(), xosc.Init()
@@ -151,7 +151,7 @@ def _document(xosc: Any, trace: Trace, way: str, notice: str, entities: Any, boa
     )
 
 
-def _begins(xosc: Any, body: Stays, place: Place, way: str) -> Iterator[Any]:
+def _begins(xosc: Any, body: Stays, place: ExportPlace, way: str) -> Iterator[Any]:
     """The actions with which a body begins."""
     if body.late:
         return
@@ -168,7 +168,7 @@ def _route(xosc: Any, path: Polyline) -> Any:
     route, parts = xosc.Route("route of ego"), max(1, math.ceil(path.length / WAYPOINTS_M))
     for i in range(parts + 1):
         x, y, heading = path.at(path.length * i / parts)
-        there = position(xosc, Moment(0.0, x, y, heading, 0.0))
+        there = position(xosc, TrackPoint(0.0, x, y, heading, 0.0))
         route.add_waypoint(there, xosc.RouteStrategy.shortest)
     return route
 
@@ -228,7 +228,7 @@ def _waiting(xosc: Any, body: Stays, ego: Stays) -> Iterator[Any]:
         yield event(xosc, f"{name} sets off", action, trigger)
 
 
-def _straight_on(last: Moment) -> Moment:
+def _straight_on(last: TrackPoint) -> TrackPoint:
     """Where a body is some time after the end of its track."""
     ahead = moved([last], last.speed * STRAIGHT_ON_S)[0]
     return ahead._replace(time=last.time + STRAIGHT_ON_S)

@@ -10,7 +10,7 @@ import json
 from collections.abc import Sequence
 from typing import Any
 
-from cavsumo.interop.tracks import Moment, Stays, Track, axle, height
+from cavsumo.interop.tracks import Stays, Track, TrackPoint, axle, height
 from cavsumo.model.bodies import BICYCLE, BUS, PEDESTRIAN
 
 PEDESTRIAN_KG = 75.0
@@ -48,7 +48,7 @@ def entity(xosc: Any, of: Stays) -> Any:
     return body
 
 
-def position(xosc: Any, moment: Moment) -> Any:
+def position(xosc: Any, moment: TrackPoint) -> Any:
     """A place in the world."""
     return xosc.WorldPosition(moment.x, moment.y, 0.0, moment.heading, 0.0, 0.0)
 
@@ -64,7 +64,7 @@ def follow(xosc: Any, name: str, track: Track, *, by_clock: bool) -> Any:
     return xosc.FollowTrajectoryAction(trajectory, xosc.FollowingMode.position, domain, 1, 0)
 
 
-def held(track: Track) -> list[Moment]:
+def held(track: Track) -> list[TrackPoint]:
     """A track with points just before and after each, on the way, with the same heading.
 
     Players turn between the headings of points in different ways; some are halfway at a point. A

@@ -19,7 +19,7 @@ CAR_HEIGHT_M = 1.5
 STOOD_MPS = 1e-3  # slower than this a body stands
 
 
-class Moment(NamedTuple):
+class TrackPoint(NamedTuple):
     """A body at a time."""
 
     time: float  # s
@@ -29,7 +29,7 @@ class Moment(NamedTuple):
     speed: float  # m/s
 
 
-Track = Sequence[Moment]
+Track = Sequence[TrackPoint]
 
 
 class Stays(NamedTuple):
@@ -53,7 +53,7 @@ class Stays(NamedTuple):
 
 def stays(trace: Trace) -> list[Stays]:
     """All bodies with their tracks, in the order of their appearance."""
-    shapes, found, parts = trace.shapes(), dict[str, list[list[Moment]]](), dict[str, str]()
+    shapes, found, parts = trace.shapes(), dict[str, list[list[TrackPoint]]](), dict[str, str]()
     last = dict[str, int]()
     for i, frame in enumerate(trace.frames):
         for part, name, (x, y, v, o) in states(frame):
@@ -64,7 +64,7 @@ def stays(trace: Trace) -> list[Stays]:
             if tracks[-1]:
                 before = tracks[-1][-1].heading
                 o = before + math.remainder(o - before, math.tau)
-            tracks[-1].append(Moment(frame["time_s"], x, y, o, v))
+            tracks[-1].append(TrackPoint(frame["time_s"], x, y, o, v))
             last[name] = i
     first, end = (trace.frames[i]["time_s"] for i in (0, -1))
     return [
@@ -81,12 +81,12 @@ def axle(shape: Shape) -> float:
     return min(shape.wheelbase, shape.length) / 2.0
 
 
-def at_axle(shape: Shape, track: Track) -> list[Moment]:
+def at_axle(shape: Shape, track: Track) -> list[TrackPoint]:
     """A track of the rear axle."""
     return moved(track, -axle(shape))
 
 
-def moved(track: Track, ahead: float) -> list[Moment]:
+def moved(track: Track, ahead: float) -> list[TrackPoint]:
     """A track of a point that lies so far ahead [m] of the one given."""
     return [
         one._replace(

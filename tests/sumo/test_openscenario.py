@@ -14,7 +14,7 @@ from inline import cavsumo as command
 
 from cavsumo.errors import Exit
 from cavsumo.interop.storyboard_parts import held
-from cavsumo.interop.tracks import Moment, at_axle, axle, driven, stays
+from cavsumo.interop.tracks import TrackPoint, at_axle, axle, driven, stays
 from cavsumo.results.reading import read_rows
 from cavsumo.results.traces import Shape, Trace, read_trace
 
@@ -45,7 +45,7 @@ def exported(
 
 def test_the_reference_point_is_on_the_rear_axle() -> None:
     """Of a vehicle; within its box, also of the bus whose wheelbase is longer; not on foot."""
-    north = Moment(0.0, 10.0, 5.0, math.pi / 2, 1.0)
+    north = TrackPoint(0.0, 10.0, 5.0, math.pi / 2, 1.0)
     assert at_axle(CAR, [north])[0][1:4] == pytest.approx((10.0, 3.5, math.pi / 2))
     assert axle(Shape("bus", 12.0, 2.55, 16.875)) == 6.0
     assert axle(Shape("pedestrian", 0.66, 0.88, 0.33)) == 0.0
@@ -54,9 +54,9 @@ def test_the_reference_point_is_on_the_rear_axle() -> None:
 def test_headings_are_held_around_each_timestep() -> None:
     """Three points each, two at the ends, all on the way."""
     track = [
-        Moment(0.0, 0.0, 0.0, 0.0, 0.0),
-        Moment(0.1, 1.0, 0.0, 0.5, 0.0),
-        Moment(0.2, 1.0, 2.0, 0.7, 0.0),
+        TrackPoint(0.0, 0.0, 0.0, 0.0, 0.0),
+        TrackPoint(0.1, 1.0, 0.0, 0.5, 0.0),
+        TrackPoint(0.2, 1.0, 2.0, 0.7, 0.0),
     ]
     points = held(track)
     times = [round(point.time, 4) for point in points]

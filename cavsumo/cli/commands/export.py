@@ -12,7 +12,7 @@ from cavsumo.cli.steps import SlowSteps, say_written
 from cavsumo.errors import Exit, InputError
 from cavsumo.interop.commonroad import XML, write_commonroad
 from cavsumo.interop.opendrive import XODR
-from cavsumo.interop.openscenario import XOSC, Place, write_openscenario
+from cavsumo.interop.openscenario import XOSC, ExportPlace, write_openscenario
 from cavsumo.kept.cavtest import is_cavtest
 from cavsumo.results.traces import Trace
 
@@ -29,13 +29,13 @@ def export(wanted: KeepOptions) -> int:
     with SlowSteps() as steps:
         steps.begin(f"exporting run {record.run}")
         route = shown_site(record.plan, record.trace).route
-        place = Place(scenario.net_file, route.path, scenario.end)
+        place = ExportPlace(scenario.net_file, route.path, scenario.end)
         names = _written(record.trace, place, wanted.output, wanted)
     say_written([wanted.output / name for name in names])
     return Exit.OK
 
 
-def _written(trace: Trace, place: Place, folder: Path, wanted: KeepOptions) -> list[str]:
+def _written(trace: Trace, place: ExportPlace, folder: Path, wanted: KeepOptions) -> list[str]:
     """Write the files of a format; their names."""
     if wanted.to == "commonroad":
         write_commonroad(trace, place, folder, wanted.way)

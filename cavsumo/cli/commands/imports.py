@@ -12,7 +12,7 @@ from cavsumo.batch.located import located
 from cavsumo.batch.replay import Record
 from cavsumo.batch.shown import shown_site
 from cavsumo.batch.trust import check_trust
-from cavsumo.cli.requests.imports import ImportOptions
+from cavsumo.cli.requests.imports import ImportEpisodeOptions
 from cavsumo.cli.steps import say_written
 from cavsumo.errors import Exit, InputError
 from cavsumo.interop.imports import read_exported
@@ -24,7 +24,7 @@ from cavsumo.results.traces import Trace, trace_text
 SAID = ("outcome", "assertion", "tester", "violation_time_s")
 
 
-def import_episode(wanted: ImportOptions) -> int:
+def import_episode(wanted: ImportEpisodeOptions) -> int:
     """Read an episode, judge its tracks once more, and write it as a trace."""
     trace = read_exported(wanted.file)
     record = _here(trace, wanted)
@@ -38,7 +38,7 @@ def import_episode(wanted: ImportOptions) -> int:
     return Exit.OK
 
 
-def _here(trace: Trace, wanted: ImportOptions) -> Record:
+def _here(trace: Trace, wanted: ImportEpisodeOptions) -> Record:
     """The record of the episode, with its network where it is now."""
     plan = plan_in(trace.head, f"{str(wanted.file)!r}")
     record = Record(plan, trace.row, trace, trace.head, wanted.file, alone=True)

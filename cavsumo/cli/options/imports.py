@@ -31,9 +31,9 @@ def add_import(commands: Any) -> None:
 
 
 def _import(options: argparse.Namespace) -> int:
-    from cavsumo.cli.requests.imports import ImportOptions, check_import
+    from cavsumo.cli.requests.imports import ImportEpisodeOptions, check_import
 
-    wanted = ImportOptions(**values_of(options, ImportOptions))
+    wanted = ImportEpisodeOptions(**values_of(options, ImportEpisodeOptions))
     check_import(wanted)
     from cavsumo.cli.commands.imports import import_episode
 

@@ -11,7 +11,7 @@ from cavsumo.results.trace_file import PACKED
 
 
 @dataclass(frozen=True)
-class ImportOptions:
+class ImportEpisodeOptions:
     """Options of import.
 
     Attributes:
@@ -27,7 +27,7 @@ class ImportOptions:
     trust: bool = False
 
 
-def check_import(wanted: ImportOptions) -> None:
+def check_import(wanted: ImportEpisodeOptions) -> None:
     """Refuse files that are not there, and other endings."""
     if not wanted.file.is_file():
         raise InputError(f"import: no such file: {str(wanted.file)!r}")
