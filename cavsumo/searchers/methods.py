@@ -8,6 +8,7 @@ import numpy as np
 
 from cavsumo.errors import InputError
 from cavsumo.model.bodies import WALKING
+from cavsumo.searchers.bounds import MEETS, SIDE, bounds_numbers
 from cavsumo.searchers.decision_space import DecisionSpace
 from cavsumo.searchers.diversity import DiversitySearch, check_installed
 from cavsumo.searchers.evolution import EvolutionSearch
@@ -53,6 +54,11 @@ def check_method(method: str, space: Space) -> None:
     """Raise InputError where a method cannot search a space."""
     if method == "diversity":
         check_installed()
+    if method in BY_DECISIONS and bounds_numbers(space):
+        raise InputError(
+            f"search.method {method}: decides anew every second, so of search.within it can keep "
+            f"{SIDE} and {MEETS} alone; choose another method"
+        )
     if method in BY_DECISIONS and space.movements.kind.name not in WALKING:
         raise InputError(
             f"search.method {method}: decides for {' and '.join(WALKING)}s alone; choose another "
