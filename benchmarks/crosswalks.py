@@ -3,10 +3,12 @@
 ``yielding``: the crosswalk of SPAIS (Delecki et al., arXiv 2412.02154) with the numbers of its
 public code; published 5.9e-5. ``start-2``, ``start-3``: starting points of ``ast-crosswalk``.
 The truth is a long run of plain Monte Carlo, given with ``--truth`` (episodes) or ``--counted``
-(failures and episodes of an earlier one). Then each estimator, from other seeds: its mean over
-the truth, how many estimates are within 10 % of it, how often an interval that is not refused
-meets that of the truth, episodes and steps with all learning, and the gain: steps of Monte Carlo
-for the same standard deviation over those of the estimator.
+(failures and episodes of an earlier one); with ``--published`` it is the published reference.
+
+Then each estimator, from other seeds: its mean over the truth, how many estimates are within 10 %
+of it, how often an interval that is not refused meets that of the truth, episodes and steps with
+all learning, and the gain: steps of Monte Carlo for the same standard deviation over those of the
+estimator.
 """
 
 from __future__ import annotations
@@ -22,6 +24,7 @@ from cavsumo.probability.monte_carlo import exact_estimate
 from cavsumo.probability.noisy import counted
 from cavsumo.probability.shifted import estimate_by_shifts
 from cavsumo.probability.splitting import REPLICAS, estimate_by_splitting
+from cavsumo.probability.weights import Estimate
 from cavsumo.probability.yielding_crosswalk import YieldingCrosswalk
 
 PROCESSES = {
@@ -29,6 +32,7 @@ PROCESSES = {
     "start-3": DisturbedCrosswalk(STARTS[2]),
     "yielding": YieldingCrosswalk(),
 }
+PUBLISHED = 5.9e-5
 ESTIMATORS = {
     "shifts": lambda process, rng, runs: estimate_by_shifts(process, rng, runs),
     "splitting": lambda process, rng, runs: estimate_by_splitting(
@@ -43,17 +47,16 @@ def main() -> None:
     parser.add_argument("process", choices=PROCESSES)
     parser.add_argument("--truth", type=int, default=10_000_000, help="episodes of Monte Carlo")
     parser.add_argument("--counted", type=int, nargs=2, metavar=("FAILURES", "EPISODES"))
+    parser.add_argument("--published", action="store_true", help=f"{PUBLISHED:g}, of yielding")
     parser.add_argument("--method", action="append", choices=ESTIMATORS)
     parser.add_argument("--runs", type=int, default=20_000, help="of an estimate, after learning")
     parser.add_argument("--replications", type=int, default=20)
     asked = parser.parse_args()
     process = PROCESSES[asked.process]
-    failures, episodes = asked.counted or _truth(asked.process, asked.truth)
-    truth = exact_estimate(failures, episodes, 0.05, 0.95)
-    print(
-        f"{asked.process}: {failures} failures in {episodes} episodes: "
-        f"{truth.p:.3g} [{truth.lower:.3g}, {truth.upper:.3g}]"
-    )
+    if asked.published and asked.process != "yielding":
+        parser.error("--published: only yielding has a published reference")
+    truth = _published() if asked.published else _truth(asked)
+    print(_words(asked.process, truth))
     mean_steps = counted(process, 1000, np.random.default_rng(0)).steps / 1000
     print("method     mean/p  rel. sd  in 10 %  meets  refused  episodes    steps     gain")
     for method in asked.method or ESTIMATORS:
@@ -62,10 +65,28 @@ def main() -> None:
         print(f"{method:9}  {_row(found, truth, mean_steps)}", flush=True)
 
 
-def _truth(name: str, episodes: int) -> tuple[int, int]:
-    """Failures among so many episodes by chance."""
-    rng = np.random.default_rng((1, list(PROCESSES).index(name)))
-    return counted(PROCESSES[name], episodes, rng).failures, episodes
+def _words(name: str, truth: Estimate) -> str:
+    """The truth in words."""
+    if not truth.episodes:
+        return f"{name}: published: {truth.p:.3g}"
+    return (
+        f"{name}: {truth.failures} failures in {truth.episodes} episodes: "
+        f"{truth.p:.3g} [{truth.lower:.3g}, {truth.upper:.3g}]"
+    )
+
+
+def _published() -> Estimate:
+    """The published reference, of which neither failures nor episodes are known."""
+    return Estimate(PUBLISHED, PUBLISHED, PUBLISHED, 0.95, 0, 0, 0.0, 1.0)
+
+
+def _truth(asked: argparse.Namespace) -> Estimate:
+    """The share of failures among episodes by chance, counted before or now."""
+    if asked.counted:
+        return exact_estimate(*asked.counted, 0.05, 0.95)
+    rng = np.random.default_rng((1, list(PROCESSES).index(asked.process)))
+    failures = counted(PROCESSES[asked.process], asked.truth, rng).failures
+    return exact_estimate(failures, asked.truth, 0.05, 0.95)
 
 
 def _row(found, truth, mean_steps: float) -> str:
