@@ -6,6 +6,7 @@ import importlib
 import importlib.util
 import json
 import re
+import shutil
 import sys
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -318,6 +319,21 @@ def test_minimise(play: Play) -> None:
     assert everything.split()[1:] == one.split()[2:]
     assert re.fullmatch(r"by force: 0 of \d+ single reductions of 1 results fail the same", force)
     assert planted.startswith("planted: 5 bodies in ")
+
+
+def test_exports(play: Play) -> None:
+    """A failure, exported and imported again; read by commonroad-io and played, where they are."""
+    words = ["--net", "crossing", "--failures", "1", "--runs", "3"]
+    there = importlib.util.find_spec("commonroad") is not None
+    words += ["--commonroad", sys.executable] if there else []
+    _, one, everything = play("exports", *words, KINDS=("pedestrian",)).splitlines()
+    assert one.split()[2:] == everything.split()[1:]
+    failures, issues, places, far, turned, missing, same, _, read, _, imported = numbers(everything)
+    assert (failures, issues, missing, imported) == (1, 0, 0, 2)
+    assert (far < 0.02, turned < 0.01) == (True, True)
+    assert read == there
+    if shutil.which("esmini"):
+        assert (places > 100, same) == (True, 1)
 
 
 def test_overlaps(play: Play) -> None:
