@@ -44,7 +44,7 @@ KEPT = (
 
 @dataclass(frozen=True)
 class TransferOrder:
-    """What is transferred, and where.
+    """An order of a transfer: which tests, and where.
 
     Attributes:
         tests: kept tests, or rows of results as ``FILE.csv:RUN``.
@@ -179,7 +179,7 @@ def label(test: int, place: int, form: str) -> str:
     return f"t{test + 1}-p{place + 1}-{form}"
 
 
-def test_of(agent: str) -> int:
+def number_of(agent: str) -> int:
     """The number of the test that an agent plays."""
     return int(agent.split("-")[0].removeprefix("t")) - 1
 

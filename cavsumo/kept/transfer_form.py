@@ -96,10 +96,10 @@ def relative_test(name: str, record: Record) -> RelativeTest:
     scenario, row = record.plan.scenario, record.row
     if scenario.script is not None:
         raise InputError(f"{name}: is a scripted test, which suites play; it is not transferred")
-    if record.trace is None:
-        raise InputError(f"{name}: no trace was kept of it")
     if not is_failure(row) or not row["tester"].startswith("tester"):
         raise InputError(f"{name}: is {row['outcome']}, expected a test that a tester fails")
+    if record.trace is None:
+        raise InputError(f"{name}: no trace was kept of it")
     body = int(row["tester"].removeprefix("tester"))
     kind = kind_named(scenario.kind)
     home = _home(record, kind)

@@ -12,7 +12,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from cavsumo.kept.transfer import TransferParts, place_of, test_of
+from cavsumo.kept.transfer import TransferParts, number_of, place_of
 from cavsumo.results.failures import NOT_JUDGED, PREVENTABLE, failure_kind
 from cavsumo.results.reading import rows_of
 from cavsumo.results.rows import cell, is_failure
@@ -55,7 +55,7 @@ def transferred(parts: TransferParts, files: Sequence[Path]) -> list[Transferred
         net = parts.nets.index(_net_of(part.name, parts.nets))
         for row in rows_of(file):
             agent = str(cell(row["agent"]))
-            rows[test_of(agent), net].append((f"{net} {place_of(agent)}", row))
+            rows[number_of(agent), net].append((f"{net} {place_of(agent)}", row))
     found = []
     for t, test in enumerate(parts.tests):
         own = [one for n in range(len(parts.nets)) for one in rows[t, n]]
