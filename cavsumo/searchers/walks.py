@@ -75,13 +75,13 @@ class Walks:
         The ego is expected to drive at the limit.
         """
         walk = walk_of(shares, self.kind)
-        return tuple(p for p in self.places if self._in_time(walk, p)) or self.places
+        return tuple(p for p in self.places if self.in_time(walk, p)) or self.places
 
     def realised(self, place: Place, shares: Mapping[str, float]) -> tuple[Place, WalkProgramme]:
         """The place as it is, and the programme of the numbers."""
         return place, walk_of(shares, self.kind)
 
-    def _in_time(self, walk: WalkProgramme, place: Place) -> bool:
+    def in_time(self, walk: WalkProgramme, place: Place) -> bool:
         """Whether the ego is still to come when a body has to step off for its programme."""
         if isinstance(walk.cue, str):
             return True

@@ -336,6 +336,20 @@ def test_exports(play: Play) -> None:
         assert (places > 100, same) == (True, 1)
 
 
+def test_transfer(play: Play) -> None:
+    """One test at one place, in each form."""
+    said = play(
+        "transfer", "--tests", "1", "--runs", "8", "--places", "1", "--seeds", "1",
+        "--net", "crossing",
+    )  # fmt: skip
+    lines = said.splitlines()
+    assert lines[0].startswith("1 minimal tests")
+    assert [line.split("|")[1:3] for line in lines[3::2]] == [
+        [" crossing, in the zone ", " 1 "],
+        [" crossing, in the phase ", " 1 "],
+    ]
+
+
 def test_overlaps(play: Play) -> None:
     """An episode on the straight road, with drawn traffic."""
     said = play("overlaps", "--net", NET, "--agent", "timing", "--runs", "1")
