@@ -154,10 +154,14 @@ def test_un_r157(play: Play) -> None:
 
 
 def test_searched_vehicles(play: Play) -> None:
-    """A line for each agent."""
-    said = play("searched_vehicles", "--kind", "bicycle", "--ego", "constant", "--runs", "2")
-    cells = [[cell.strip() for cell in line.split("|")[1:5]] for line in said.splitlines()[2:]]
-    assert cells == [["crossing", "bicycle", "constant", agent] for agent in ("search", "timing")]
+    """A line for each tester; nobody reaches a conclusion in two episodes."""
+    wanted = ["--tester", "search:random", "--tester", "timing", "--runs", "2", "--seed", "1"]
+    crossing = str(ROOT / "networks" / "crossing.net.xml")
+    lines = play("searched_vehicles", crossing, "--kind", "bicycle", *wanted).splitlines()[2:]
+    cells = [line.split()[:5] for line in lines]
+    names = [["crossing", "bicycle", tester] for tester in ("search:random", "timing")]
+    assert [row[:3] for row in cells] == names
+    assert all(row[3] in ("0/1", "1/1") for row in cells)
 
 
 def test_ast_crosswalk(play: Play) -> None:
