@@ -1,9 +1,8 @@
-"""What is expected of a point before it is played: the results of tests like it.
+"""Expectations of a point before it is played: the results of tests like it.
 
 Each body that takes part is compared with the bodies of the points so far: where it starts and
 what it does. A result counts for the body that the verdict names; if nobody was met, for all that
-took part. So proposals that come too late for any driver, or that nobody would meet, are told
-apart from others, whatever they were derived from (pre-selection with a surrogate, as in
+took part. So the one of several proposals is played that promises most (pre-selection with a surrogate, as in
 evolution strategies: Jin, Swarm and Evolutionary Computation 1 (2011) 61-70).
 """
 

@@ -26,6 +26,7 @@ EARLY: Range = (0.2, 1.0)
 SHORT: Range = (0.1, 0.4)  # as an ego that keeps its speed could not stop any more
 TIMED: Range = (0.65, 0.75)  # as an ego that reacts at once can just stop
 SOON: Range = (0.1, 0.7)  # of vehicles, that late
+FROM_LEFT: Range = (0.5, 1.0)  # beyond the oncoming lane, where traffic keeps to the right
 ON: Range = (ON_SHARE, 1.0)  # without a stop
 
 # For each manoeuvre the ranges of some coordinates of ``walks.Walks`` and ``drives.Drives``.
@@ -33,12 +34,13 @@ WALKS: Mapping[str, Mapping[str, Range]] = {
     "crosses in time": {
         "zone": TIMED, "speed": (0.95, 1.0), "heading": STRAIGHT, "depth": THROUGH,
     },
+    "comes from afar and stops in the way": {
+        "place": FROM_LEFT, "zone": (0.08, 0.26), "speed": (0.75, 1.0), "heading": (0.1, 0.55),
+        "depth": (0.62, 0.97),
+    },
     "crosses": {"zone": LATE, "speed": (0.5, 1.0), "heading": STRAIGHT, "depth": THROUGH},
     "crosses slowly": {"zone": LATE, "speed": (0.0, 0.35), "heading": STRAIGHT, "depth": THROUGH},
     "comes towards": {"zone": LATE, "speed": (0.0, 0.6), "heading": (0.0, 0.35), "depth": THROUGH},
-    "comes towards, fast": {
-        "zone": SHORT, "speed": (0.85, 1.0), "heading": (0.0, 0.35), "depth": (0.7, 1.0),
-    },
     "walks away": {"zone": LATE, "heading": (0.65, 1.0), "depth": THROUGH},
     "comes closer, then steps in": {
         "zone": SHORT, "speed": (0.0, 0.5), "heading": (0.1, 0.6), "depth": (0.05, 0.3),
@@ -101,6 +103,9 @@ PAIRS: Mapping[str, Sequence[tuple[Mapping[str, Range], Mapping[str, Range]]]] =
 }
 
 ANY = 0.25  # how often the next one in turn comes all the same
+# An ego that decides only now and then seldom reacts before a body is in its way, which is unfair
+# if it can then not stop: the least share of "zone" against it, by the name of the movements.
+LEAST_ZONE = {"walks": 0.3}
 PRIOR, LEAST = 0.4, 0.05  # value of a manoeuvre of which nothing is known, and the least
 TRIES = 8  # draws of a point, of which the one that promises most is played
 TYPICAL_S = 20.0  # a manoeuvre of which nothing is known takes so long
@@ -174,7 +179,15 @@ class ManoeuvreSearch:
         for i, ranges in enumerate(manoeuvres):
             for coordinate, (low, high) in ranges.items():
                 point[self.space.index(i, coordinate)] = self.rng.uniform(low, high)
+            self._delay(point, i)
         return point
+
+    def _delay(self, point: Point, body: int) -> None:
+        """Let a body come later against an ego that decides only now and then."""
+        space, zone = self.space, self.space.index(body, "zone")
+        together = body and space.share(point, body, "company") >= TOGETHER
+        if space.every and not together:
+            point[zone] = max(point[zone], LEAST_ZONE.get(space.movements.name, 0.0))
 
     def _sort(self) -> int:
         """Which sort of point comes next."""

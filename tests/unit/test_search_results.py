@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Callable
 
 import numpy as np
@@ -11,7 +12,7 @@ from cavsumo.model.bodies import PEDESTRIAN
 from cavsumo.model.scenario import BatchPlan
 from cavsumo.network.site import Site
 from cavsumo.searchers.expected import Expected
-from cavsumo.searchers.manoeuvres import ManoeuvreSearch
+from cavsumo.searchers.manoeuvres import LEAST_ZONE, ManoeuvreSearch
 from cavsumo.searchers.neighbours import FailedPoint, NeighbourSearch
 from cavsumo.searchers.protocol import PlayedPoint
 from cavsumo.searchers.space import Point, Space, space_of
@@ -141,3 +142,14 @@ def test_the_search_climbs_towards_harder_failures(space: Space) -> None:
         searcher.tell(points, [told(point) for point in points])
     assert sorted(searcher.failed) == [(0.0,), (1.0,)]
     assert max(one.grade for one in searcher.failed.values()) > 3.5
+
+
+def test_against_an_ego_that_decides_now_and_then_nobody_comes_too_early(space: Space) -> None:
+    """No first body of a known manoeuvre; against others some do."""
+
+    def earliest(one: Space) -> float:
+        searcher = ManoeuvreSearch(one, np.random.default_rng(1))
+        return min(one.share(p, 0, "zone") for _ in range(3) for p in searcher.ask())
+
+    assert earliest(space) < 0.2
+    assert earliest(dataclasses.replace(space, every=1.0)) >= LEAST_ZONE["walks"] > 0.2
