@@ -2,8 +2,8 @@
 
 Each body that takes part is compared with the bodies of the points so far: where it starts and
 what it does. A result counts for the body that the verdict names; if nobody was met, for all that
-took part. So the one of several proposals is played that promises most (pre-selection with a surrogate, as in
-evolution strategies: Jin, Swarm and Evolutionary Computation 1 (2011) 61-70).
+took part. So the one of several proposals is played that promises most (pre-selection with a
+surrogate, as in evolution strategies: Jin, Swarm and Evolutionary Computation 1 (2011) 61-70).
 """
 
 from __future__ import annotations
