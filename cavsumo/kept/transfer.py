@@ -196,21 +196,20 @@ def fitting(test: RelativeTest, space: Space, most: int) -> list[Fit]:
     vehicles on approaches on which they arrive about as much earlier than the ego.
     """
     fits: list[Fit] = []
-    for place in space.movements.places:
-        fit = place.whence == test.whence and _in_time(test, place, space)
-        if fit and _apart(place, fits):
+    for place in _in_time(test, space):
+        if place.whence == test.whence and _apart(place, fits):
             fits.append((place, test.at(place)))
     if len(fits) <= most:
         return fits
     return [fits[round(i * (len(fits) - 1) / max(1, most - 1))] for i in range(most)]
 
 
-def _in_time(test: RelativeTest, place: Place, space: Space) -> bool:
-    """Whether the body can meet the ego from a place as it did."""
+def _in_time(test: RelativeTest, space: Space) -> tuple[Place, ...]:
+    """The places from which the body can meet the ego as it did."""
     if isinstance(space.movements, Walks):
         assert isinstance(test.programme, WalkProgramme)
-        return space.movements.in_time(test.programme, place)
-    return abs(place.lead - test.lead) <= LEADS_S
+        return space.movements.in_time(test.programme)
+    return tuple(p for p in space.movements.places if abs(p.lead - test.lead) <= LEADS_S)
 
 
 def _apart(place: Place, others: Sequence[Fit]) -> bool:
