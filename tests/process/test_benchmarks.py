@@ -6,6 +6,7 @@ import importlib
 import importlib.util
 import json
 import re
+import shutil
 import sys
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -153,10 +154,14 @@ def test_un_r157(play: Play) -> None:
 
 
 def test_searched_vehicles(play: Play) -> None:
-    """A line for each agent."""
-    said = play("searched_vehicles", "--kind", "bicycle", "--ego", "constant", "--runs", "2")
-    cells = [[cell.strip() for cell in line.split("|")[1:5]] for line in said.splitlines()[2:]]
-    assert cells == [["crossing", "bicycle", "constant", agent] for agent in ("search", "timing")]
+    """A line for each tester; nobody reaches a conclusion in two episodes."""
+    wanted = ["--tester", "search:random", "--tester", "timing", "--runs", "2", "--seed", "1"]
+    crossing = str(ROOT / "networks" / "crossing.net.xml")
+    lines = play("searched_vehicles", crossing, "--kind", "bicycle", *wanted).splitlines()[2:]
+    cells = [line.split()[:5] for line in lines]
+    names = [["crossing", "bicycle", tester] for tester in ("search:random", "timing")]
+    assert [row[:3] for row in cells] == names
+    assert all(row[3] in ("0/1", "1/1") for row in cells)
 
 
 def test_ast_crosswalk(play: Play) -> None:
@@ -318,6 +323,35 @@ def test_minimise(play: Play) -> None:
     assert everything.split()[1:] == one.split()[2:]
     assert re.fullmatch(r"by force: 0 of \d+ single reductions of 1 results fail the same", force)
     assert planted.startswith("planted: 5 bodies in ")
+
+
+def test_exports(play: Play) -> None:
+    """A failure, exported and imported again; read by commonroad-io and played, where they are."""
+    words = ["--net", "crossing", "--failures", "1", "--runs", "3"]
+    there = importlib.util.find_spec("commonroad") is not None
+    words += ["--commonroad", sys.executable] if there else []
+    _, one, everything = play("exports", *words, KINDS=("pedestrian",)).splitlines()
+    assert one.split()[2:] == everything.split()[1:]
+    failures, issues, places, far, turned, missing, same, _, read, _, imported = numbers(everything)
+    assert (failures, issues, missing, imported) == (1, 0, 0, 2)
+    assert (far < 0.02, turned < 0.01) == (True, True)
+    assert read == there
+    if shutil.which("esmini"):
+        assert (places > 100, same) == (True, 1)
+
+
+def test_transfer(play: Play) -> None:
+    """One test at one place, in each form."""
+    said = play(
+        "transfer", "--tests", "1", "--runs", "8", "--places", "1", "--seeds", "1",
+        "--net", "crossing",
+    )  # fmt: skip
+    lines = said.splitlines()
+    assert lines[0].startswith("1 minimal tests")
+    assert [line.split("|")[1:3] for line in lines[3::2]] == [
+        [" crossing, in the zone ", " 1 "],
+        [" crossing, in the phase ", " 1 "],
+    ]
 
 
 def test_overlaps(play: Play) -> None:
