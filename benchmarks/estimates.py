@@ -9,7 +9,10 @@ the variance of as many episodes of Monte Carlo over that of the estimates.
 from __future__ import annotations
 
 import argparse
+import json
 import math
+from pathlib import Path
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -19,6 +22,23 @@ from cavsumo.probability.monte_carlo import exact_estimate
 
 NEVER = 1e-6  # a half-width that is not reached
 TRUTH_SEED, FIRST_SEED = 1, 1001
+MONTE_CARLO = "monte-carlo"
+
+
+class Truth(NamedTuple):
+    """A long run of Monte Carlo.
+
+    Attributes:
+        episodes: how many were played.
+        simulated_s: in how much simulated time [s].
+        failures: how many failed.
+        failed: which, from 0, for a kept run; None for one that was just played.
+    """
+
+    episodes: int
+    simulated_s: float
+    failures: int
+    failed: tuple[int, ...] | None = None
 
 
 def main() -> None:
@@ -28,30 +48,61 @@ def main() -> None:
     parser.add_argument("--ego", default="sumo")
     parser.add_argument("--exposure", help="a TOML file; without it the default")
     parser.add_argument("--truth", type=int, default=100_000, help="episodes")
+    parser.add_argument("--kept", help="a file of benchmarks/truth, in place of playing the truth")
     parser.add_argument("--replications", type=int, default=50)
     parser.add_argument("--episodes", type=int, default=2000, help="of an estimate")
     parser.add_argument("--method", action="append", choices=ESTIMATE_METHODS)
     parser.add_argument("--jobs", type=int, default=1)
     asked = parser.parse_args()
-    truth = _estimated(asked, "monte-carlo", asked.truth, TRUTH_SEED)
-    exact = exact_estimate(truth["failures"], asked.truth, 0.05, 0.95)
-    seconds = truth["simulated_s"] / asked.truth
+    truth = _truth(asked)
+    exact = exact_estimate(truth.failures, truth.episodes, 0.05, 0.95)
     print(
-        f"truth: {exact.failures} failures in {asked.truth} episodes of {seconds:.1f} s: "
-        f"{exact.p:.3g} [{exact.lower:.3g}, {exact.upper:.3g}]"
+        f"truth: {exact.failures} failures in {truth.episodes} episodes of "
+        f"{truth.simulated_s / truth.episodes:.1f} s: {exact.p:.3g} "
+        f"[{exact.lower:.3g}, {exact.upper:.3g}]"
     )
     print("method       mean/p  rel. sd  refused  meets  gain  said")
     for method in asked.method or ESTIMATE_METHODS:
-        found = [
-            _estimated(asked, method, asked.episodes, FIRST_SEED + i)
-            for i in range(asked.replications)
-        ]
+        if method == MONTE_CARLO and truth.failed is not None:
+            found = _blocks(truth, asked.episodes)[: asked.replications]
+        else:
+            seeds = range(FIRST_SEED, FIRST_SEED + asked.replications)
+            found = [_estimated(asked, method, asked.episodes, seed) for seed in seeds]
         print(_row(method, found, exact.p, (exact.lower, exact.upper), asked.episodes), flush=True)
 
 
-def _estimated(
-    asked: argparse.Namespace, method: str, episodes: int, seed: int
-) -> dict[str, object]:
+def _truth(asked: argparse.Namespace) -> Truth:
+    """The long run: kept, or played now."""
+    if asked.kept is None:
+        found = _estimated(asked, MONTE_CARLO, asked.truth, TRUTH_SEED)
+        return Truth(asked.truth, found["simulated_s"], found["failures"])
+    kept = json.loads(Path(asked.kept).read_text(encoding="utf-8"))
+    for key in ("net", "ego"):
+        if kept[key] != getattr(asked, key):
+            raise SystemExit(f"{asked.kept}: is of {key} {kept[key]}, not {getattr(asked, key)}")
+    failed = tuple(kept["failed"])
+    return Truth(kept["episodes"], kept["simulated_s"], len(failed), failed)
+
+
+def _blocks(truth: Truth, episodes: int) -> list[dict[str, Any]]:
+    """Estimates of Monte Carlo from parts of a kept run."""
+    found = []
+    for begin in range(0, truth.episodes - episodes + 1, episodes):
+        failures = sum(begin <= run < begin + episodes for run in truth.failed or ())
+        one = exact_estimate(failures, episodes, 0.05, 0.95)
+        found.append(
+            {
+                "refused": None,
+                "lower": one.lower,
+                "upper": one.upper,
+                "looks": [{"p": one.p}],
+                "gain": {"value": 1.0},
+            }
+        )
+    return found
+
+
+def _estimated(asked: argparse.Namespace, method: str, episodes: int, seed: int) -> dict[str, Any]:
     """One estimate of all its episodes, as the command prints it."""
     found = cavsumo.estimate(
         asked.net,

@@ -126,6 +126,16 @@ def test_estimates(play: Play) -> None:
     assert [row.split()[0] for row in methods] == ["auto", "monte-carlo"]
 
 
+def test_estimates_beside_a_kept_truth(play: Play) -> None:
+    """Blocks of the long run are the estimates of Monte Carlo; another network is refused."""
+    kept = "--kept", str(ROOT / "benchmarks" / "truth" / "crossing.json")
+    truth, _, row = play("estimates", *kept, "--method", "monte-carlo").splitlines()
+    assert truth.startswith("truth: 178 failures in 100000 episodes")
+    assert row.split()[:2] == ["monte-carlo", "1.00"]
+    with pytest.raises(SystemExit, match="is of net crossing, not junction"):
+        play("estimates", *kept, "--net", "junction")
+
+
 def test_drivers_under_an_exposure(play: Play, monkeypatch: pytest.MonkeyPatch) -> None:
     """Two drivers, ten episodes each."""
     monkeypatch.syspath_prepend(str(ROOT / "experiments" / "search"))
