@@ -12,6 +12,7 @@ from collections.abc import Callable, Iterator, Mapping
 from typing import ClassVar
 
 from cavsumo.agents.driving import HASTE_MPS2, RUN_OUT_M, Course, stopping_from
+from cavsumo.agents.red_lights import holds, red_along
 from cavsumo.agents.triggers import MARGIN, MAX_DECEL, REACTION_TIME, Trigger
 from cavsumo.model.bodies import NOOP, Action
 from cavsumo.model.carriageway import Approach
@@ -30,6 +31,7 @@ SQUEEZE_M = 20.0  # a lane that ends so soon after leaving the ego's ends beside
 STOPPING_M = 30.0  # so far before the end of its way it considers the end again
 ARRIVED_M = 0.3  # a body so near the axis of a lane is on it
 MOVING_OFF = 0.7  # an ego slower than this share of its speed limit that gains speed moves off
+BEFORE_LINE_M = 0.5  # it stops so far before a red light
 FAR_M = 30.0  # a run that leads into the ego's lane has ended after this
 
 
@@ -39,7 +41,7 @@ class EgoPrediction:
     def __init__(self, scene: Scene, limit: float) -> None:
         self.scene, self.limit = scene, limit
         self.front = self.v = self.gaining = 0.0
-        self._seen = -1
+        self._seen = -2  # no timestep before the first one either
 
     def see(self, snapshot: Snapshot) -> None:
         """Take in a snapshot."""
@@ -65,6 +67,7 @@ class Manoeuvre:
     """
 
     types: ClassVar[tuple[str, ...]]  # of approach on which it is possible
+    minds_ego: ClassVar[bool] = False  # whether it brakes for an ego that is ahead on its way
 
     def __init__(self, scene: Scene, approach: Approach, course: Course) -> None:
         self.scene, self.approach, self.course = scene, approach, course
@@ -77,7 +80,7 @@ class Manoeuvre:
         """Begin."""
 
     def act(self, state: BodyState, others: Iterator[BodyState]) -> Action:
-        """The next action; ``others`` are all but the ego."""
+        """The next action; ``others`` are all, without an ego that it does not mind."""
         raise NotImplementedError
 
     def over(self, state: BodyState) -> bool:
@@ -148,12 +151,16 @@ class CutIn(Manoeuvre):
     """Changes into the ego's lane and slows down."""
 
     types = ("adjacent",)
+    arrived = False  # in the ego's lane
+
+    def possible(self, state: BodyState) -> bool:
+        return self.arrived or self.course.place(state)[0] >= self.approach.enter
 
     def begin(self, state: BodyState) -> None:
         assert self.approach.into is not None
         top = max(state.v, CREEPING_MPS)
         self.course = Course(self.approach.into, state.body.kind, self.scene.dt, top)
-        self.slowed, self.arrived = SLOWED * top, False
+        self.slowed = SLOWED * top
 
     def act(self, state: BodyState, others: Iterator[BodyState]) -> Action:
         self.arrived = self.arrived or abs(self.course.place(state)[1]) < ARRIVED_M
@@ -233,10 +240,22 @@ class Driver:
         here, dt = self.course.place(state)[0], self.scene.dt
         left = self.course.path.length + self._run_out - here - state.v * dt
         allowed = self.course.room(state, everybody(snapshot, state))
-        if not self._begun and here < self.approach.enter:
+        waits = math.isfinite(self.approach.wait)
+        if waits and not self._begun and here < self.approach.enter:
             left = min(left, self.approach.wait - here - state.v * dt)
             allowed = min(allowed, math.inf if hurry else self._unhurried(snapshot, here))
+        elif not waits:
+            left = min(left, self._to_light(snapshot, state) - state.v * dt)
         return self.course.drive(state, min(allowed, stopping_from(left, 0.0, dt)))
+
+    def _to_light(self, snapshot: Snapshot, state: BodyState) -> float:
+        """How far it is to a red light of the ego's way at which a vehicle ahead can stop [m]."""
+        if not self.scene.lights:
+            return math.inf
+        half = state.body.kind.length / 2
+        front = self.scene.ego_path.project(state.x, state.y).along + half
+        line = red_along(self.scene, snapshot, front)
+        return line - BEFORE_LINE_M - front if holds(line, front, state.v) else math.inf
 
     def _unhurried(self, snapshot: Snapshot, here: float) -> float:
         """The speed that leads to the ego's way no sooner than the ego to it [m/s]."""
@@ -248,12 +267,17 @@ class Driver:
 
     def begin(self, state: BodyState) -> bool:
         """Begin the manoeuvre; False when there is none, it is too late, or it has begun before."""
-        if self.manoeuvre is None or self._begun or not self.manoeuvre.possible(state):
+        if not self.can_begin(state):
             return False
+        assert self.manoeuvre is not None
         self.manoeuvre.begin(state)
         self.course = self.manoeuvre.course  # cutting in leads to another
         self.active = self._begun = True
         return True
+
+    def can_begin(self, state: BodyState) -> bool:
+        """Whether there is a manoeuvre, it has not begun before, and it is not too late for it."""
+        return self.manoeuvre is not None and not self._begun and self.manoeuvre.possible(state)
 
     def over(self, state: BodyState) -> bool:
         """Whether the manoeuvre has ended."""
@@ -266,7 +290,8 @@ class Driver:
     def act(self, snapshot: Snapshot, state: BodyState) -> Action:
         """The next action of the manoeuvre."""
         assert self.manoeuvre is not None
-        return self.manoeuvre.act(state, everybody(snapshot, state, ego=False))
+        others = everybody(snapshot, state, ego=self.manoeuvre.minds_ego)
+        return self.manoeuvre.act(state, others)
 
     def timing(self, aim: float) -> Trigger:
         """The trigger that times the manoeuvre by the ego's arrival."""

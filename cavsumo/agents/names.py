@@ -36,7 +36,7 @@ AGENT_NAMES = Names(
         "proximity": "distance_m idle manoeuvre",
         "q-learning": "alpha gamma epsilon half_life hold_s weights learn",
         "random": "rate_per_s epsilon between",
-        "search": "method cut earlier",
+        "search": "method cut within earlier",
         "timing": "aim idle manoeuvre",
     },
 )
@@ -46,7 +46,7 @@ SEARCH_METHODS = (
     "portfolio", "random", "manoeuvres", "neighbours", "cma", "diversity", "tree", "explore",
 )  # fmt: skip
 EXPOSURE = "exposure"  # the agent whose random vectors an estimator chooses, by one of these
-ESTIMATE_METHODS = ("auto", "monte-carlo", "importance")
+ESTIMATE_METHODS = ("auto", "monte-carlo", "stratified", "importance")
 
 PREFIX = "policy:"
 

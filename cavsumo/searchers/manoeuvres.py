@@ -13,6 +13,7 @@ from functools import cached_property
 
 import numpy as np
 
+from cavsumo.searchers.bounds import part
 from cavsumo.searchers.drives import THROUGH as ON_SHARE
 from cavsumo.searchers.expected import Expected, value_of
 from cavsumo.searchers.protocol import GENERATION, PlayedPoint
@@ -177,7 +178,8 @@ class ManoeuvreSearch:
         """A point whose bodies do these manoeuvres."""
         point = self.rng.random(self.space.dimension)
         for i, ranges in enumerate(manoeuvres):
-            for coordinate, (low, high) in ranges.items():
+            for coordinate, wanted in ranges.items():
+                low, high = part(self.space.movements, coordinate, wanted)
                 point[self.space.index(i, coordinate)] = self.rng.uniform(low, high)
             self._delay(point, i)
         return point

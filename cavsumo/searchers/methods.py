@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
+from typing import Any
 
 import numpy as np
 
+from cavsumo.agents.names import SEARCH_METHODS
 from cavsumo.errors import InputError
 from cavsumo.model.bodies import WALKING
+from cavsumo.searchers.bounds import MEETS, SIDE, bounds_numbers
 from cavsumo.searchers.decision_space import DecisionSpace
 from cavsumo.searchers.diversity import DiversitySearch, check_installed
 from cavsumo.searchers.evolution import EvolutionSearch
@@ -20,6 +23,8 @@ from cavsumo.searchers.space import Space
 from cavsumo.searchers.tree import TreeSearch
 
 BY_DECISIONS = ("tree", "explore")
+# Packages that choose points, besides numpy.
+PACKAGES = {"portfolio": ("cma",), "cma": ("cma",), "diversity": ("cma", "ribs")}
 
 
 def _neighbours(space: Space, rng: np.random.Generator) -> Searcher:
@@ -49,10 +54,25 @@ def searcher_of(method: str, space: Space, rng: np.random.Generator) -> Searcher
     return SEARCHERS[method](space, rng)
 
 
+def method_of(params: Mapping[str, Any]) -> str:
+    """The method of a search, from the parameters of its agent."""
+    return str(params.get("method", SEARCH_METHODS[0]))
+
+
+def packages_of(methods: Iterable[str]) -> list[str]:
+    """The packages that choose the points of these methods, besides numpy."""
+    return sorted({package for method in methods for package in PACKAGES.get(method, ())})
+
+
 def check_method(method: str, space: Space) -> None:
     """Raise InputError where a method cannot search a space."""
     if method == "diversity":
         check_installed()
+    if method in BY_DECISIONS and bounds_numbers(space):
+        raise InputError(
+            f"search.method {method}: decides anew every second, so of search.within it can keep "
+            f"{SIDE} and {MEETS} alone; choose another method"
+        )
     if method in BY_DECISIONS and space.movements.kind.name not in WALKING:
         raise InputError(
             f"search.method {method}: decides for {' and '.join(WALKING)}s alone; choose another "

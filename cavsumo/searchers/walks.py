@@ -61,19 +61,38 @@ class Walks:
     }
     manner: ClassVar[tuple[str, ...]] = ("speed", "heading", "depth")
 
+    @property
+    def scales(self) -> Mapping[str, tuple[float, float]]:
+        """The bounds of the numbers that are even, angles in degrees."""
+        speeds, oblique = (SLOWEST_MPS, self.kind.v_max), math.degrees(OBLIQUE_RAD)
+        return {
+            "zone": ZONES,
+            "speed": speeds,
+            "heading": (-oblique, oblique),
+            "depth": DEPTHS_M,
+            "speed_2": speeds,
+            "heading_2": (-180.0, 180.0),
+            "length_2": (0.0, LONGEST_M),
+            "heading_3": (-180.0, 180.0),
+        }
+
     def suited(self, shares: Mapping[str, float]) -> tuple[Place, ...]:
         """The places from which the programme of the numbers can be in time; all if none can.
 
         The ego is expected to drive at the limit.
         """
         walk = walk_of(shares, self.kind)
+        return self.in_time(walk) or self.places
+
+    def in_time(self, walk: WalkProgramme) -> tuple[Place, ...]:
+        """The places where the ego is still to come when a body has to step off for a programme."""
         if isinstance(walk.cue, str):
             return self.places
         along, limit, aways, which = self._ways
         entered = np.array([entry_of(walk, away, self.kind) for away in aways])[which]
         zone = np.array([zone_m(walk.cue, v) for v in limit.tolist()])
         in_time = along + entered[:, 1] >= limit * entered[:, 0] + zone
-        return tuple(compress(self.places, in_time)) or self.places
+        return tuple(compress(self.places, in_time))
 
     def realised(self, place: Place, shares: Mapping[str, float]) -> tuple[Place, WalkProgramme]:
         """The place as it is, and the programme of the numbers."""

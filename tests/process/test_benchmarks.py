@@ -6,6 +6,7 @@ import importlib
 import importlib.util
 import json
 import re
+import shutil
 import sys
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -102,12 +103,15 @@ def test_rare_events(play: Play) -> None:
 def test_estimators(play: Play) -> None:
     """Two replications of each method on each function; probabilities are known."""
     _, *found = play("estimators", "--replications", "2", "--episodes", "200").splitlines()
-    assert [row.split()[2] for row in found[:5]] == [
-        "auto", "monte-carlo", "importance", "sobol", "subset",
+    assert [row.split()[2] for row in found[:6]] == [
+        "auto", "monte-carlo", "stratified", "importance", "sobol", "subset",
     ]  # fmt: skip
+    words = "--replications", "2", "--half-width", "5", "--method", "monte-carlo"
+    _, early = play("estimators", *words, "--function", "corners").splitlines()
+    assert float(early.split()[7]) < 2000
     assert {row.split()[0]: row.split()[1] for row in found} == {
         "corner": "1.0e-04", "corners": "1.0e-03", "ball": "1.2e-04", "scattered": "1.0e-03",
-        "pedestrian": found[-1].split()[1],
+        "pedestrian": found[-7].split()[1], "lights": "2.1e-03",
     }  # fmt: skip
 
 
@@ -120,6 +124,17 @@ def test_estimates(play: Play) -> None:
     assert truth.startswith("truth: ")
     assert " in 20 episodes of " in truth
     assert [row.split()[0] for row in methods] == ["auto", "monte-carlo"]
+
+
+def test_drivers_under_an_exposure(play: Play, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Two drivers, ten episodes each."""
+    monkeypatch.syspath_prepend(str(ROOT / "experiments" / "search"))
+    monkeypatch.setenv("PYTHONPATH", str(ROOT / "experiments" / "search"))
+    words = "--net", "pedestrians", "--ego", "constant", "--ego", "faulty_drivers:Careful"
+    _, _, *rows = play("exposed_drivers", *words, "--max-episodes", "10").splitlines()
+    assert [row.split(" | ")[0] for row in rows] == ["| constant", "| Careful"]
+    assert all(row.split(" | ")[2] == "10" for row in rows)
+    assert rows[1].split(" | ")[3] == "0"
 
 
 def test_reference_tracks(play: Play) -> None:
@@ -139,10 +154,14 @@ def test_un_r157(play: Play) -> None:
 
 
 def test_searched_vehicles(play: Play) -> None:
-    """A line for each agent."""
-    said = play("searched_vehicles", "--kind", "bicycle", "--ego", "constant", "--runs", "2")
-    cells = [[cell.strip() for cell in line.split("|")[1:5]] for line in said.splitlines()[2:]]
-    assert cells == [["crossing", "bicycle", "constant", agent] for agent in ("search", "timing")]
+    """A line for each tester; nobody reaches a conclusion in two episodes."""
+    wanted = ["--tester", "search:random", "--tester", "timing", "--runs", "2", "--seed", "1"]
+    crossing = str(ROOT / "networks" / "crossing.net.xml")
+    lines = play("searched_vehicles", crossing, "--kind", "bicycle", *wanted).splitlines()[2:]
+    cells = [line.split()[:5] for line in lines]
+    names = [["crossing", "bicycle", tester] for tester in ("search:random", "timing")]
+    assert [row[:3] for row in cells] == names
+    assert all(row[3] in ("0/1", "1/1") for row in cells)
 
 
 def test_ast_crosswalk(play: Play) -> None:
@@ -150,6 +169,15 @@ def test_ast_crosswalk(play: Play) -> None:
     lines = play("ast_crosswalk", "--episodes", "50", "--sumo", "1").splitlines()[1:]
     assert [line.split()[0] for line in lines] == ["start-1", "start-2", "start-3"]
     assert all("of 50" in line and line.endswith("alike 1") for line in lines)
+
+
+def test_crosswalks(play: Play) -> None:
+    """One estimate by each method on a starting point, with a truth that is given."""
+    words = "start-2", "--counted", "107", "10000", "--runs", "200", "--replications", "2"
+    truth, _, *found = play("crosswalks", *words).splitlines()
+    assert truth.startswith("start-2: 107 failures in 10000 episodes: 0.0107 [")
+    assert [row.split()[0] for row in found] == ["shifts", "splitting"]
+    assert all(numbers(row)[5] > 1000 for row in found)
 
 
 def test_street_suites(play: Play) -> None:
@@ -295,6 +323,35 @@ def test_minimise(play: Play) -> None:
     assert everything.split()[1:] == one.split()[2:]
     assert re.fullmatch(r"by force: 0 of \d+ single reductions of 1 results fail the same", force)
     assert planted.startswith("planted: 5 bodies in ")
+
+
+def test_exports(play: Play) -> None:
+    """A failure, exported and imported again; read by commonroad-io and played, where they are."""
+    words = ["--net", "crossing", "--failures", "1", "--runs", "3"]
+    there = importlib.util.find_spec("commonroad") is not None
+    words += ["--commonroad", sys.executable] if there else []
+    _, one, everything = play("exports", *words, KINDS=("pedestrian",)).splitlines()
+    assert one.split()[2:] == everything.split()[1:]
+    failures, issues, places, far, turned, missing, same, _, read, _, imported = numbers(everything)
+    assert (failures, issues, missing, imported) == (1, 0, 0, 2)
+    assert (far < 0.02, turned < 0.01) == (True, True)
+    assert read == there
+    if shutil.which("esmini"):
+        assert (places > 100, same) == (True, 1)
+
+
+def test_transfer(play: Play) -> None:
+    """One test at one place, in each form."""
+    said = play(
+        "transfer", "--tests", "1", "--runs", "8", "--places", "1", "--seeds", "1",
+        "--net", "crossing",
+    )  # fmt: skip
+    lines = said.splitlines()
+    assert lines[0].startswith("1 minimal tests")
+    assert [line.split("|")[1:3] for line in lines[3::2]] == [
+        [" crossing, in the zone ", " 1 "],
+        [" crossing, in the phase ", " 1 "],
+    ]
 
 
 def test_overlaps(play: Play) -> None:
@@ -511,14 +568,22 @@ def test_the_tables_of_the_experiments(
     assert (tmp_path / "agency.csv").is_file() == (name == "tables")
 
 
+@pytest.mark.parametrize(
+    ("drivers", "driver"),
+    [("faulty_drivers", "SeesTheNearestOnly"), ("other_drivers", "YieldsToOne")],
+)
 def test_scores_against_faulty_drivers(
-    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], tmp_path: Path
+    drivers: str,
+    driver: str,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+    tmp_path: Path,
 ) -> None:
     """One driver, ten episodes of a search and of timing; the table once more from the file."""
     monkeypatch.syspath_prepend(str(ROOT / "experiments" / "search"))
     monkeypatch.setenv("PYTHONPATH", "")
     file = str(tmp_path / "trials.jsonl")
-    words = ["--driver", "SeesTheNearestOnly", "--seed", "1", "--episodes", "10", "-j", "1"]
+    words = ["--drivers", drivers, "--driver", driver, "--seed", "1", "--episodes", "10", "-j", "1"]
     monkeypatch.setattr(sys, "argv", ["score.py", *words, "--net", "pedestrians", "-o", file])
     script("search/score").main()
     table = capsys.readouterr().out
@@ -527,7 +592,7 @@ def test_scores_against_faulty_drivers(
     assert last.startswith("timing: a faulty driver failed in ")
     assert " of 1 trials" in last
     trials = [json.loads(line) for line in Path(file).read_text(encoding="utf-8").splitlines()]
-    assert [(t["driver"], t["testers"]) for t in trials] == [("SeesTheNearestOnly", 2)] * 2
+    assert [(t["driver"], t["testers"]) for t in trials] == [(driver, 2)] * 2
     monkeypatch.setattr(sys, "argv", ["score.py", "--read", file])
     script("search/score").main()
     assert capsys.readouterr().out == table

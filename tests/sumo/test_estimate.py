@@ -117,6 +117,35 @@ def test_two_egos_meet_the_same_encounters(folder: Path, capsys: Capture) -> Non
     assert "too few for a ratio" in said["comparison"]["refused"]
 
 
+def test_the_output_may_be_redirected_into_a_default_name(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The results then lie beside it; without redirection they have the default name."""
+    monkeypatch.chdir(tmp_path)
+    words = ["estimate", "--net", "pedestrians", "--ego", "constant", "--trace", "none", "-q"]
+    words += ["--max-episodes", "2", "--json"]
+    for name, file in (("results.json", "estimate.csv"), ("estimate.json", "results.csv")):
+        with Path(name).open("w", encoding="utf-8") as stream, monkeypatch.context() as patch:
+            patch.setattr("sys.stdout", stream)
+            assert main(words) == Exit.OK
+        said = json.loads(Path(name).read_text(encoding="utf-8"))
+        assert (said["results"], said["episodes"]) == (file, 2)
+        assert len(rows(tmp_path / file)) == 2
+        for there in tmp_path.glob("*.*"):
+            there.unlink()
+
+
+def test_results_do_not_replace_the_redirected_output(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: Capture
+) -> None:
+    """A results file that was named: the sentence says what collides."""
+    with (tmp_path / "a.json").open("w", encoding="utf-8") as stream:
+        monkeypatch.setattr("sys.stdout", stream)
+        assert _estimate(tmp_path / "a.csv", "--overwrite", most=2) == Exit.USAGE
+    assert "this command is redirected into" in capsys.readouterr().err
+    assert [file.name for file in tmp_path.iterdir()] == ["a.json"]
+
+
 def test_beside_other_agents_all_play_equally_often(tmp_path: Path) -> None:
     """An exposure in a batch of two agents goes on after its estimate is over."""
     words = ["run", "--net", "pedestrians", "--ego", "constant", "--testers", "1", "--runs", "25"]
@@ -124,6 +153,35 @@ def test_beside_other_agents_all_play_equally_often(tmp_path: Path) -> None:
     words += ["--param", "bound=0.99", "--param", "method=monte-carlo"]
     assert main([*words, "-o", str(tmp_path / "both.csv")]) == 0
     assert [row["agent"] for row in rows(tmp_path / "both.csv")] == ["exposure", "noop"] * 25
+
+
+VEHICLES = """
+[{kind}.arrivals]
+within_s = 2.0
+[{kind}.attention]
+inattentive = {share}
+"""
+
+
+@pytest.mark.parametrize("kind", ["bicycle", "car"])
+def test_vehicles_meet_the_ego(kind: str, tmp_path: Path, capsys: Capture) -> None:
+    """Those who do not look go at once and are hit; those who look let the ego pass, and replay."""
+    met = {}
+    for share in ("0.0", "1.0"):
+        file, exposure = tmp_path / f"{share}.csv", tmp_path / f"{share}.toml"
+        exposure.write_text(VEHICLES.format(kind=kind, share=share), encoding="utf-8")
+        words = ["estimate", "--net", "crossing", "--routes", "none", "--ego", "constant"]
+        words += ["--kind", kind, "--method", "stratified", "--max-episodes", "12", "-q"]
+        words += ["--half-width", "1e-6", "--exposure", str(exposure), "-o", str(file)]
+        assert main(words) == Exit.OK
+        met[share] = [row["outcome"] for row in rows(file)]
+        assert not {"error", "invalid"} & {*met[share]}
+        assert estimated(file).per_hour == {"bicycle": 30.0, "car": 120.0}[kind]
+    assert "violated" not in met["0.0"]
+    assert "violated" in met["1.0"]
+    run = str(met["1.0"].index("violated"))
+    assert main(["replay", str(tmp_path / "1.0.csv"), run]) == Exit.OK
+    assert "frames: the same" in capsys.readouterr().out
 
 
 @pytest.mark.parametrize(
@@ -136,7 +194,7 @@ def test_beside_other_agents_all_play_equally_often(tmp_path: Path) -> None:
         (["--agent", "timing"], "--agent: expected none"),
         (["--picture", "a.gif"], "--picture 'a.gif': expected a name that ends in .svg or .png"),
         (["--against", "sumo", "--method", "importance"], "--against: needs --method monte-carlo"),
-        (["--kind", "car"], "agent exposure can only walk"),
+        (["--kind", "bus"], "only pedestrian, bicycle and car have one"),
         (["--max-episodes", "0"], "runs"),
         (["--method", "importance", "--max-episodes", "60"], "at least 100 episodes, got 60"),
     ],

@@ -19,6 +19,7 @@ if TYPE_CHECKING:
 DEFAULTS = {"agents": [EXPOSURE], "testers": 1, "runs": 2000}
 PLAIN = "monte-carlo"
 ALL = 1e-6  # a half-width that no episodes reach
+OTHERWISE = ("estimate.csv", "episodes.csv")  # where the output itself goes into SCRATCH
 PICTURES = (".svg", ".png")
 
 
@@ -27,8 +28,9 @@ def add_estimate(commands: Any) -> None:
     estimate = commands.add_parser(
         "estimate",
         help="estimate how often an ego fails preventably",
-        description="Estimate how often an ego fails preventably when pedestrians do what an "
-        f"exposure says. All options of run, with other defaults: agent {EXPOSURE}, one tester.",
+        description="Estimate how often an ego fails preventably when pedestrians, cyclists or "
+        "drivers (--kind) do what an exposure says. All options of run, with other defaults: agent "
+        f"{EXPOSURE}, one tester.",
         allow_abbrev=False,
     )
     estimate.fill = _fill
@@ -38,7 +40,7 @@ def add_estimate(commands: Any) -> None:
 def _fill(estimate: argparse.ArgumentParser) -> None:
     """Add the options."""
     add = estimate.add_argument
-    add("--exposure", metavar="FILE", help="what pedestrians do by chance (TOML)")
+    add("--exposure", metavar="FILE", help="what people do by chance (TOML)")
     add(
         "--method", choices=ESTIMATE_METHODS, metavar="NAME",
         help=f"estimator: {', '.join(ESTIMATE_METHODS)} (default {ESTIMATE_METHODS[0]})",
@@ -58,6 +60,7 @@ def _fill(estimate: argparse.ArgumentParser) -> None:
 def _estimate(options: argparse.Namespace) -> int:
     from cavsumo.batch.manner import Manner, Means
     from cavsumo.batch.planned import planned
+    from cavsumo.cli.options.redirected import free_output
     from cavsumo.cli.scenario_settings import parts_of
 
     shown = _shown(options)
@@ -66,7 +69,8 @@ def _estimate(options: argparse.Namespace) -> int:
         parts = _against(parts, options)
     manner = Manner(**values_of(options, Manner), scratch=options.output is None)
     means = Means(options.jobs, options.executor, options.scheduler)
-    batches = planned(parts, Path(options.output or SCRATCH), manner)
+    output = free_output(options.output, (SCRATCH, *OTHERWISE), parts)
+    batches = planned(parts, output, manner)
     from cavsumo.cli.commands.estimate import estimate
 
     return estimate(batches, means, manner, shown)

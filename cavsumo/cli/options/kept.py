@@ -58,12 +58,22 @@ def add_export(commands: Any) -> None:
         "export",
         help="write a recorded episode in a format of others",
         description="Write a recorded episode in a format of others. openscenario: test.xosc "
-        "(OpenSCENARIO XML 1.2), in which everybody follows the recorded track, and test.xodr "
-        "(OpenDRIVE) with the roads.",
+        "(OpenSCENARIO XML 1.2) and test.xodr (OpenDRIVE 1.7) with the roads; commonroad: test.xml "
+        "(CommonRoad 2020a) with lanelets, obstacles and the ego's planning problem.",
         allow_abbrev=False,
     )
     _add_episode(export)
-    export.add_argument("--to", required=True, choices=("openscenario",), help="the format")
+    export.add_argument(
+        "--to", required=True, choices=("openscenario", "commonroad"), help="the format"
+    )
+    export.add_argument(
+        "--as",
+        dest="way",
+        choices=("recorded", "test"),
+        default="recorded",
+        help="recorded: all follow their recorded tracks (default); test: the ego is left to the "
+        "player's controller, testers wait for it and then follow theirs",
+    )
     export.add_argument(
         "-o", "--output", type=Path, required=True, metavar="FOLDER", help="a folder for the files"
     )
