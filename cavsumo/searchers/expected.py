@@ -23,7 +23,7 @@ ALONG_M, OTHER_SIDE, BY_REACTION = 15.0, 1.0, 2.0  # differences that count as 1
 LIKE = 0.5  # distance at which two bodies are alike
 UNKNOWN = 1.0  # weight of a prior value
 PRIOR = 0.2  # that value
-PER_M = 0.5 / 100.0  # cost of a metre of the ego's approach, as nothing is tested meanwhile
+PER_M = 0.15 / 100.0  # cost of a metre of the ego's approach, as nothing is tested meanwhile
 
 Known = NDArray[np.float64]
 
