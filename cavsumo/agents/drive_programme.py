@@ -2,7 +2,9 @@
 
 A programme is a few numbers, so that a search can vary it (``searchers.drives``); their meaning is
 in ``programmed_manoeuvres``. Before and after its manoeuvre the vehicle drives lawfully
-(``manoeuvres.Driver``).
+(``manoeuvres.Driver``). One that crosses the ego's way is on its way to it for seconds, in which
+the ego's speed changes; so until it has to brake for its line it keeps to its time, and only then
+has it begun.
 """
 
 from __future__ import annotations
@@ -10,23 +12,27 @@ from __future__ import annotations
 import math
 
 from cavsumo.agents.cues import Awaited, EgoReactions, Pause, in_phase, zone_m
-from cavsumo.agents.driving import extent, within_turn
+from cavsumo.agents.driving import BRAKING_MPS2, extent, within_turn
 from cavsumo.agents.manoeuvres import Driver, EgoPrediction
 from cavsumo.agents.programmed_manoeuvres import (
     DriveProgramme,
+    Followed,
     Legs,
     ProgrammedRun,
     programmed_manoeuvre,
 )
-from cavsumo.model.bodies import Action, clamped
+from cavsumo.model.bodies import SIDEWAYS_MPS2, Action, clamped
 from cavsumo.model.scene import Scene
 from cavsumo.model.snapshot import BodyState, Snapshot
 
-SIDEWAYS_MPS2 = 5.0  # largest acceleration sideways: half of what dry tyres hold
 LATE_S = (
     0.3  # a vehicle that would come so much later than its cue says drives up to the line first
 )
+EARLY_S = 0.5  # one that would come earlier by no more than this does not stop at its line
 AT_LINE_M = 1.0  # a vehicle so near to its line waits there
+SLOWEST_MPS = 1.0  # a slower ego counts as so fast
+EASING_MPS2 = 1.0  # brake of one that would come too early, far from its line
+KEPT = 0.75  # a moment stays chosen until it is this share of the interval of decisions off
 
 
 class ProgrammedDrive:
@@ -40,7 +46,8 @@ class ProgrammedDrive:
         self._driver = Driver(scene, index, "lawful", chosen)
         self._ego = EgoPrediction(scene, approach.ego_speed)
         self._reactions = EgoReactions()
-        self._approach, self._late = approach, False
+        self._approach, self._late, self._under_way = approach, False, False
+        self._chosen = math.inf  # when it is to come into the ego's way
         if programme is not None:
             self._pause = Pause(programme.pause, programme.resume)
             cue = programme.cue
@@ -60,9 +67,10 @@ class ProgrammedDrive:
             return driver.idle(snapshot, state)
         if driver.active and driver.over(state):
             driver.end()
-        due = driver.active or self._due(snapshot, state, programme)
-        if not driver.active and not (due and driver.begin(state)):
-            return driver.idle(snapshot, state, hurry=self._late)
+        if not driver.active:
+            waits = self._before(snapshot, state, programme)
+            if waits is not None:
+                return waits
         legs = driver.manoeuvre
         assert isinstance(legs, Legs)
         stands = legs.stands and not legs.second
@@ -70,26 +78,78 @@ class ProgrammedDrive:
             snapshot, self._reactions, lambda: self._gap(snapshot, state)
         ):
             legs.go_on()
-        wanted = driver.act(snapshot, state)
+        return self._natural(driver.act(snapshot, state), state, programme)
+
+    def _natural(self, wanted: Action, state: BodyState, programme: DriveProgramme) -> Action:
+        """An action within the limits of the programme and of tyres."""
         natural = wanted._replace(throttle=max(-programme.braking, wanted.throttle))
         return within_turn(clamped(natural, state.body.kind), state, SIDEWAYS_MPS2)
 
+    def _before(
+        self, snapshot: Snapshot, state: BodyState, programme: DriveProgramme
+    ) -> Action | None:
+        """The action of a vehicle whose manoeuvre has not begun; None where it begins now."""
+        driver = self._driver
+        if not driver.can_begin(state):
+            return driver.idle(snapshot, state)
+        if self._due(snapshot, state, programme):
+            if self._awaited is not None or self._committed(state):
+                driver.begin(state)
+                return None
+            self._under_way = True
+            return self._natural(driver.act(snapshot, state), state, programme)
+        idle = driver.idle(snapshot, state, hurry=self._late)
+        if self._under_way and self._to_line(state) > state.v * state.v / (2.0 * EASING_MPS2):
+            return idle._replace(throttle=max(-EASING_MPS2, idle.throttle))
+        return idle
+
+    def _committed(self, state: BodyState) -> bool:
+        """Whether it would have to brake for its line now; always where it need not wait."""
+        return self._to_line(state) <= AT_LINE_M + state.v * state.v / (2.0 * BRAKING_MPS2)
+
+    def _to_line(self, state: BodyState) -> float:
+        """How far it still is to its line, or to where it stops before that [m]."""
+        approach, programme = self._approach, self.programme
+        if not math.isfinite(approach.wait):
+            return -math.inf
+        assert programme is not None
+        stop = math.inf if programme.depth is None else approach.enter + programme.depth
+        return min(approach.wait, stop) - self._driver.course.place(state)[0]
+
     def _due(self, snapshot: Snapshot, state: BodyState, programme: DriveProgramme) -> bool:
-        """Whether the vehicle begins now."""
+        """Whether it is time for the manoeuvre."""
         if not snapshot.sees_ego:
             return False
         if self._awaited is not None:
             return self._awaited.came(self._reactions, snapshot.time)
-        assert self._driver.manoeuvre is not None
-        assert not isinstance(programme.cue, str)
-        meeting = self._driver.manoeuvre.gap(self._ego, state)
+        manoeuvre, cue = self._driver.manoeuvre, programme.cue
+        assert manoeuvre is not None
+        assert not isinstance(cue, str)
+        meeting = manoeuvre.gap(self._ego, state)
         if meeting is None:
             return False
         gap, v = meeting
-        most, half = zone_m(programme.cue, v), programme.every / 2
-        self._late = gap < most - v * (LATE_S + half) and self._can_hurry(state)
-        in_time = gap <= most + v * half and not self._late
-        return in_time and in_phase(snapshot.time, programme.phase, programme.every, self.scene.dt)
+        spare = (gap - zone_m(cue, v)) / max(SLOWEST_MPS, v)
+        dt, every, now = self.scene.dt, programme.every, snapshot.time
+        if not isinstance(manoeuvre, ProgrammedRun):
+            assert isinstance(manoeuvre, Followed)
+            close = spare <= every / 2 or manoeuvre.followed(self._ego, state, gap)
+            return close and in_phase(now, programme.phase, every, dt)
+        arrives = now + manoeuvre.arrival(state)[0]
+        spare = self._moment(arrives + spare, programme) - arrives
+        self._late = spare < -LATE_S and not self._under_way and self._can_hurry(state)
+        # To stop at the line costs more time than that, and it is only foreseen.
+        most = EARLY_S if self._under_way and self._committed(state) else dt / 2
+        return spare <= most and not self._late
+
+    def _moment(self, time: float, programme: DriveProgramme) -> float:
+        """The moment with the programme's phase that is nearest to a time, or was so before [s]."""
+        every, phase = programme.every, programme.phase
+        if every <= self.scene.dt:
+            return time
+        if abs(self._chosen - time) > KEPT * every:
+            self._chosen = phase + every * round((time - phase) / every)
+        return self._chosen
 
     def _can_hurry(self, state: BodyState) -> bool:
         """Whether it has not yet come to where it waits, so that it can still gain time."""

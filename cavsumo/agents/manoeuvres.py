@@ -39,7 +39,7 @@ class EgoPrediction:
     def __init__(self, scene: Scene, limit: float) -> None:
         self.scene, self.limit = scene, limit
         self.front = self.v = self.gaining = 0.0
-        self._seen = -1
+        self._seen = -2  # no timestep before the first one either
 
     def see(self, snapshot: Snapshot) -> None:
         """Take in a snapshot."""
@@ -148,12 +148,16 @@ class CutIn(Manoeuvre):
     """Changes into the ego's lane and slows down."""
 
     types = ("adjacent",)
+    arrived = False  # in the ego's lane
+
+    def possible(self, state: BodyState) -> bool:
+        return self.arrived or self.course.place(state)[0] >= self.approach.enter
 
     def begin(self, state: BodyState) -> None:
         assert self.approach.into is not None
         top = max(state.v, CREEPING_MPS)
         self.course = Course(self.approach.into, state.body.kind, self.scene.dt, top)
-        self.slowed, self.arrived = SLOWED * top, False
+        self.slowed = SLOWED * top
 
     def act(self, state: BodyState, others: Iterator[BodyState]) -> Action:
         self.arrived = self.arrived or abs(self.course.place(state)[1]) < ARRIVED_M
@@ -233,7 +237,8 @@ class Driver:
         here, dt = self.course.place(state)[0], self.scene.dt
         left = self.course.path.length + self._run_out - here - state.v * dt
         allowed = self.course.room(state, everybody(snapshot, state))
-        if not self._begun and here < self.approach.enter:
+        waits = math.isfinite(self.approach.wait)
+        if waits and not self._begun and here < self.approach.enter:
             left = min(left, self.approach.wait - here - state.v * dt)
             allowed = min(allowed, math.inf if hurry else self._unhurried(snapshot, here))
         return self.course.drive(state, min(allowed, stopping_from(left, 0.0, dt)))
@@ -248,12 +253,17 @@ class Driver:
 
     def begin(self, state: BodyState) -> bool:
         """Begin the manoeuvre; False when there is none, it is too late, or it has begun before."""
-        if self.manoeuvre is None or self._begun or not self.manoeuvre.possible(state):
+        if not self.can_begin(state):
             return False
+        assert self.manoeuvre is not None
         self.manoeuvre.begin(state)
         self.course = self.manoeuvre.course  # cutting in leads to another
         self.active = self._begun = True
         return True
+
+    def can_begin(self, state: BodyState) -> bool:
+        """Whether there is a manoeuvre, it has not begun before, and it is not too late for it."""
+        return self.manoeuvre is not None and not self._begun and self.manoeuvre.possible(state)
 
     def over(self, state: BodyState) -> bool:
         """Whether the manoeuvre has ended."""

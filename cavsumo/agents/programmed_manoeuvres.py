@@ -14,17 +14,29 @@ from typing import NamedTuple
 
 from cavsumo.agents.cues import Cue
 from cavsumo.agents.driving import BRAKING_MPS2, HASTE_MPS2, Course, stopping_from
-from cavsumo.agents.manoeuvres import ARRIVED_M, Brake, CutIn, MakeManoeuvre, Run
+from cavsumo.agents.manoeuvres import (
+    ARRIVED_M,
+    Brake,
+    CutIn,
+    EgoPrediction,
+    MakeManoeuvre,
+    Run,
+)
+from cavsumo.agents.triggers import MAX_DECEL
 from cavsumo.model.bodies import Action
 from cavsumo.model.carriageway import Approach
 from cavsumo.model.scene import Scene
 from cavsumo.model.snapshot import BodyState
+from cavsumo.model.zone_presence import drift
 
 SLOW_MPS = 0.05  # a vehicle so slow stands
 HARD_MPS2 = 8.0  # brake with all effort; without any driving.BRAKING_MPS2
 GENTLE_MPS2 = 1.0  # throttle without effort; with all of it driving.HASTE_MPS2
 CHANGE_S = (1.8, 1.0)  # the pursued point of a change of lanes, without and with all effort
+CHANGING = 0.7  # share of its speed that it keeps at least until it has changed
 NEAREST_M = 5.0  # that point is no nearer
+SAME_MPS = 0.3  # an ego faster by no more than this follows
+FOLLOWING_S = 3.0  # if it is so near
 ENDED_S = 3.0  # it drives lawfully so long after it went on
 
 
@@ -101,9 +113,15 @@ class ProgrammedRun(Legs, Run):
         self.gaining, self._depth, self._pause = programme.gaining, programme.depth, programme.pause
         self._hesitates = programme.hesitates
         self._from_rest: tuple[float, float] | None = None
+        self._last: tuple[BodyState, tuple[float, float]] | None = None
 
     def arrival(self, state: BodyState) -> tuple[float, float]:
         """As of any run; of one that hesitates with its stop, after which it goes on."""
+        if self._last is None or self._last[0] is not state:  # it is asked for twice
+            self._last = state, self._arrival(state)
+        return self._last[1]
+
+    def _arrival(self, state: BodyState) -> tuple[float, float]:
         if self._depth is None or not self._hesitates or self.stands:
             return super().arrival(state)
         stop = max(self.approach.enter + self._depth, self.approach.wait)
@@ -126,7 +144,15 @@ class ProgrammedRun(Legs, Run):
         return self.course.drive(state, allowed, gaining=self.gaining)
 
 
-class ProgrammedBrake(Legs, Brake):
+class Followed(Legs):
+    """A manoeuvre ahead of an ego that comes closer, or that follows already."""
+
+    def followed(self, ego: EgoPrediction, state: BodyState, gap: float) -> bool:
+        """Whether the ego comes no closer to a vehicle at a gap [m]."""
+        return ego.v <= state.v + SAME_MPS and 0.0 < gap <= FOLLOWING_S * ego.v
+
+
+class ProgrammedBrake(Followed, Brake):
     """Brakes ahead of the ego, to a stand or to a speed, and goes on."""
 
     def __init__(
@@ -135,6 +161,11 @@ class ProgrammedBrake(Legs, Brake):
         super().__init__(scene, approach, course)
         self._programme = programme
         self._wanted = programme.speed if programme.depth is None else 0.0
+
+    def gap(self, ego: EgoPrediction, state: BodyState) -> tuple[float, float] | None:
+        """The present one, as the stopping zones count it."""
+        rear = self.course.place(state)[0] - state.body.kind.length / 2
+        return rear + drift(state.v, ego.v, MAX_DECEL) - ego.front, ego.v
 
     def act(self, state: BodyState, others: Iterator[BodyState]) -> Action:
         programme, dt = self._programme, self.scene.dt
@@ -149,18 +180,19 @@ class ProgrammedBrake(Legs, Brake):
         return self.standing > ENDED_S
 
 
-class ProgrammedCutIn(Legs, CutIn):
-    """Changes into the ego's lane at a speed, then goes on at another or stops for a while."""
+class ProgrammedCutIn(Followed, CutIn):
+    """Changes into the ego's lane, brakes there to a speed or to a stand, and goes on."""
 
     def __init__(
         self, scene: Scene, approach: Approach, course: Course, programme: DriveProgramme
     ) -> None:
         super().__init__(scene, approach, course)
-        self._programme = programme
+        self._programme, self._changing = programme, 0.0
 
     def begin(self, state: BodyState) -> None:
         super().begin(state)
-        top = max(self._programme.speed, self._programme.speed_2)
+        self._changing = max(CHANGING * state.v, self._programme.speed)
+        top = max(self._changing, self._programme.speed_2)
         self.course = Course(self.course.path, state.body.kind, self.scene.dt, top)
 
     def act(self, state: BodyState, others: Iterator[BodyState]) -> Action:
@@ -180,10 +212,11 @@ class ProgrammedCutIn(Legs, CutIn):
 
     def _wanted(self) -> float:
         """The speed of the present leg [m/s]."""
+        if not self.arrived:
+            return self._changing
         if self.second:
             return self._programme.speed_2
-        stops = self.arrived and self._programme.depth is not None
-        return 0.0 if stops else self._programme.speed
+        return self._programme.speed if self._programme.depth is None else 0.0
 
 
 MANOEUVRES = (ProgrammedRun, ProgrammedBrake, ProgrammedCutIn)

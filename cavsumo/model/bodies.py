@@ -84,6 +84,7 @@ BICYCLE = Kind(
 )
 KINDS: Mapping[str, Kind] = {k.name: k for k in (PEDESTRIAN, CAR, BUS, BICYCLE)}
 WALKING = (PEDESTRIAN.name,)  # kinds that start on pavements; the others start on lanes for cars
+SIDEWAYS_MPS2 = 5.0  # largest acceleration sideways of one that drives: half of what tyres hold
 
 
 def kind_named(name: str) -> Kind:

@@ -22,10 +22,14 @@ needs to stop, and one beside the ego that touches it, both leave no time.
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 from cavsumo.assertions.contacts import STANDING_MPS
 from cavsumo.assertions.judgement import HELD, INVALID, UNFAIR, VIOLATED
+from cavsumo.model.bodies import SIDEWAYS_MPS2, WALKING
+from cavsumo.model.geometry import Point, corners, in_frame
+from cavsumo.model.zone_presence import drift
 
 if TYPE_CHECKING:
     from cavsumo.model.snapshot import BodyState
@@ -72,11 +76,16 @@ def _spare(episode: Episode) -> float:
         room = own.length / 2 + v * v / (2.0 * BRAKES_MPS2)
         for tester in snapshot.testers:
             dx, dy, reach = tester.x - ego.x, tester.y - ego.y, tester.body.kind.reach
-            ahead = dx * cos + dy * sin
+            ahead, walks = dx * cos + dy * sin, tester.body.kind.name in WALKING
+            far = room + reach + least * v + (0.0 if walks else tester.v * v / BRAKES_MPS2)
             # not passed, and perhaps nearer than any before
-            if -own.length / 2 - reach <= ahead < room + reach + least * v:
+            if not -own.length / 2 - reach <= ahead < far:
+                continue
+            if walks:
                 beside = abs(dy * cos - dx * sin) - own.width / 2
                 least = min(least, _left(tester, ego.o, ahead - room, beside, v))
+            else:
+                least = min(least, _left_by_vehicle(tester, ego, room, v))
     return least
 
 
@@ -86,6 +95,42 @@ def _left(tester: BodyState, heading: float, ahead: float, beside: float, v: flo
 
     along, across = extent(tester, heading)
     return max(0.0, (ahead - along) / v, (beside - across) / tester.body.kind.v_max)
+
+
+def _left_by_vehicle(tester: BodyState, ego: BodyState, room: float, v: float) -> float:
+    """How long a vehicle leaves an ego at a speed that stops within its room [s].
+
+    It counts where it will be (``zone_presence``), and comes aside by steering: from its speed to
+    the side on with the acceleration that tyres hold.
+    """
+    seen, half = in_frame(tester.box, ego.x, ego.y, ego.o), ego.body.kind.width / 2
+    shift = drift(tester.v * math.cos(seen.heading), ego.v, BRAKES_MPS2)
+    points, leftwards = corners(seen), tester.v * math.sin(seen.heading)
+    right, left = min(y for _, y in points), max(y for _, y in points)
+    ahead = min(x for x, _ in points)
+    if right > half:
+        aside = _time_aside(right - half, -leftwards)
+    elif left < -half:
+        aside = _time_aside(-half - left, leftwards)
+    else:
+        aside, ahead = 0.0, _nearest(points, half)
+    return max(0.0, (ahead + shift - room) / v, aside)
+
+
+def _time_aside(way: float, towards: float) -> float:
+    """How long a vehicle takes for a way to the side, with a speed towards it [s]."""
+    gained = math.sqrt(towards * towards + 2.0 * SIDEWAYS_MPS2 * way) - towards
+    return gained / SIDEWAYS_MPS2
+
+
+def _nearest(points: Sequence[Point], half: float) -> float:
+    """The least x of that part of a convex area at which y is at most so far from 0 [m]."""
+    xs = [x for x, y in points if abs(y) <= half]
+    for (x, y), (u, w) in zip(points, (*points[1:], points[0]), strict=True):
+        for side in (-half, half):
+            if (y - side) * (w - side) < 0.0:
+                xs.append(x + (u - x) * (side - y) / (w - y))
+    return min(xs)
 
 
 def _short(avoidability: Avoidability) -> float:

@@ -123,6 +123,17 @@ def test_estimates(play: Play) -> None:
     assert [row.split()[0] for row in methods] == ["auto", "monte-carlo"]
 
 
+def test_drivers_under_an_exposure(play: Play, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Two drivers, ten episodes each."""
+    monkeypatch.syspath_prepend(str(ROOT / "experiments" / "search"))
+    monkeypatch.setenv("PYTHONPATH", str(ROOT / "experiments" / "search"))
+    words = "--net", "pedestrians", "--ego", "constant", "--ego", "faulty_drivers:Careful"
+    _, _, *rows = play("exposed_drivers", *words, "--max-episodes", "10").splitlines()
+    assert [row.split(" | ")[0] for row in rows] == ["| constant", "| Careful"]
+    assert all(row.split(" | ")[2] == "10" for row in rows)
+    assert rows[1].split(" | ")[3] == "0"
+
+
 def test_reference_tracks(play: Play) -> None:
     """One cell: the largest differences are within the tolerances."""
     test, everything = play("reference_tracks", "--only", "CPFA/60/50").splitlines()[1:]
@@ -151,6 +162,15 @@ def test_ast_crosswalk(play: Play) -> None:
     lines = play("ast_crosswalk", "--episodes", "50", "--sumo", "1").splitlines()[1:]
     assert [line.split()[0] for line in lines] == ["start-1", "start-2", "start-3"]
     assert all("of 50" in line and line.endswith("alike 1") for line in lines)
+
+
+def test_crosswalks(play: Play) -> None:
+    """One estimate by each method on a starting point, with a truth that is given."""
+    words = "start-2", "--counted", "107", "10000", "--runs", "200", "--replications", "2"
+    truth, _, *found = play("crosswalks", *words).splitlines()
+    assert truth.startswith("start-2: 107 failures in 10000 episodes: 0.0107 [")
+    assert [row.split()[0] for row in found] == ["shifts", "splitting"]
+    assert all(numbers(row)[5] > 1000 for row in found)
 
 
 def test_street_suites(play: Play) -> None:

@@ -12,7 +12,7 @@ import pytest
 
 from cavsumo.assertions.judgement import HELD, NOT_TRIGGERED, UNFAIR, VIOLATED, Judgement
 from cavsumo.egos.reference.human import FULL_MPS2
-from cavsumo.model.bodies import PEDESTRIAN
+from cavsumo.model.bodies import CAR, PEDESTRIAN
 from cavsumo.model.scene import Scene
 from cavsumo.model.snapshot import Snapshot
 from cavsumo.results.grade import INVALID_GRADE, grade
@@ -96,3 +96,33 @@ def test_a_human_is_short_of_the_time_since_the_tester_could_be_seen_to_come(
     assert short(8) == pytest.approx(needed - 0.4, abs=0.11)  # before that it was off the road
     said = Judgement("give-way", HELD, "car1")
     assert human_short(scene, [scene_snapshot(scene)], said) is None
+
+
+def test_the_spare_time_that_a_vehicle_leaves(
+    straight_scene: Callable[..., Scene], scene_snapshot: Callable[..., Snapshot]
+) -> None:
+    """It counts where it will be, as it lies, and comes aside no faster than tyres hold."""
+    scene, none = straight_scene(kind=CAR), Judgement("", NOT_TRIGGERED)
+    half, front = CAR.length / 2, scene.ego.kind.length / 2
+    lane, v = -1.825, 8.0
+    way = v * v / 18.0
+
+    def spare(x: float, y: float, speed: float, heading: float) -> float:
+        seen = [scene_snapshot(scene, (10.0, v), [(x, y, speed, heading)])]
+        share = -3.0 - grade(_episode(none, seen=seen), None)
+        return share / (1.0 - share)
+
+    ahead = 10.0 + front + way + half
+    assert spare(ahead + 4.0, lane, 0.0, 0.0) == pytest.approx(4.0 / v)
+    assert spare(ahead + 4.0, lane, 6.0, 0.0) == pytest.approx((4.0 + 6.0**2 / 18.0) / v)
+    assert spare(ahead + 8.0, lane, 3.0, math.pi) == pytest.approx((8.0 - 3.0 * v / 9.0) / v)
+    beside = lane + scene.ego.kind.width / 2 + CAR.width / 2 + 1.6
+    assert spare(ahead, beside, 0.0, math.pi) == pytest.approx(math.sqrt(2.0 * 1.6 / 5.0))
+    crossing = lane + scene.ego.kind.width / 2 + half + 2.0  # 2 m away, at 4 m/s
+    assert spare(ahead, crossing, 4.0, -math.pi / 2) == pytest.approx((6.0 - 4.0) / 5.0)
+    # Askew, one corner 0.1 m in the strip: that corner counts, not the bumper beside the strip.
+    root = math.sqrt(0.5)
+    askew = lane + scene.ego.kind.width / 2 + root * (half + CAR.width / 2) - 0.1
+    corner = root * (half - CAR.width / 2) - 0.1
+    turned = spare(10.0 + front + way + 3.0 - corner, askew, 0.0, math.radians(135.0))
+    assert turned == pytest.approx(3.0 / v)
