@@ -54,15 +54,14 @@ def main() -> None:
 def _line(net: Path, tester: str, options: argparse.Namespace) -> str:
     """One row of the table: the batches of all seeds."""
     before = processor_time()
-    batches = [_played(net, tester, seed, options) for seed in options.seed]
+    batches = [played(net, tester, seed, options) for seed in options.seed]
     cpu, rows = processor_time() - before, pd.concat(batches)
-    failures = [_preventable(batch) for batch in batches]
+    failures = [preventable_among(batch) for batch in batches]
     hard = sum((found["impact_speed_mps"] >= options.impact).any() for found in failures)
     count, seconds = sum(map(len, failures)), float(rows["time_s"].sum())
     others = int((rows["outcome"] == "violated").sum()) - count
     spoilt = rows["outcome"].isin(["unfair", "invalid"]).mean()
-    low, high = (1000.0 * bound / seconds for bound in _poisson(count))
-    rate = f"{1000.0 * count / seconds:.1f} [{low:.1f}, {high:.1f}]"
+    rate = per_1000_s(count, seconds)
     name = net.name.removesuffix(".net.xml")
     return (
         f"{name:26} {tester:18} {f'{hard}/{len(batches)}':>7} {count:11} "
@@ -71,19 +70,22 @@ def _line(net: Path, tester: str, options: argparse.Namespace) -> str:
     )
 
 
-def _played(net: Path, tester: str, seed: int, options: argparse.Namespace) -> pd.DataFrame:
-    """The rows of one batch."""
+def played(
+    net: Path, tester: str, seed: int, options: argparse.Namespace, **settings: Any
+) -> pd.DataFrame:
+    """The rows of one batch; ``settings`` of its scenario go before the others."""
     agent, _, method = tester.partition(":")
     how: dict[str, Any] = {"agents": [agent]}
     if method:
         how |= {"testers": options.testers, "params": {"search.method": method}}
+    how |= settings
     return cavsumo.run(
         net, routes="none", ego=options.ego, runs=options.runs, seed=seed, trace="none",
         jobs=options.jobs, progress=False, **how,
     ).rows  # fmt: skip
 
 
-def _preventable(rows: pd.DataFrame) -> pd.DataFrame:
+def preventable_among(rows: pd.DataFrame) -> pd.DataFrame:
     """The preventable failures among rows."""
     return rows[[failure_kind(row) == PREVENTABLE for row in rows.to_dict("records")]]
 
@@ -91,6 +93,12 @@ def _preventable(rows: pd.DataFrame) -> pd.DataFrame:
 def _kinds(failures: pd.DataFrame) -> int:
     """How many of them are not alike."""
     return len({kind_of(row) for row in failures[list(FEATURES)].astype(str).to_dict("records")})
+
+
+def per_1000_s(count: int, seconds: float) -> str:
+    """A count in 1000 seconds, with its interval."""
+    low, high = (1000.0 * bound / seconds for bound in _poisson(count))
+    return f"{1000.0 * count / seconds:.1f} [{low:.1f}, {high:.1f}]"
 
 
 def _poisson(count: int) -> tuple[float, float]:

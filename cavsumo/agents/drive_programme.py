@@ -21,6 +21,7 @@ from cavsumo.agents.programmed_manoeuvres import (
     ProgrammedRun,
     programmed_manoeuvre,
 )
+from cavsumo.agents.red_lights import holds, red_along
 from cavsumo.model.bodies import SIDEWAYS_MPS2, Action, clamped
 from cavsumo.model.scene import Scene
 from cavsumo.model.snapshot import BodyState, Snapshot
@@ -118,7 +119,7 @@ class ProgrammedDrive:
 
     def _due(self, snapshot: Snapshot, state: BodyState, programme: DriveProgramme) -> bool:
         """Whether it is time for the manoeuvre."""
-        if not snapshot.sees_ego:
+        if not snapshot.sees_ego or self._ego_waits(snapshot):
             return False
         if self._awaited is not None:
             return self._awaited.came(self._reactions, snapshot.time)
@@ -141,6 +142,13 @@ class ProgrammedDrive:
         # To stop at the line costs more time than that, and it is only foreseen.
         most = EARLY_S if self._under_way and self._committed(state) else dt / 2
         return spare <= most and not self._late
+
+    def _ego_waits(self, snapshot: Snapshot) -> bool:
+        """Whether the ego stops at a red light before they would meet, or will."""
+        if not self.scene.lights or not math.isfinite(self._approach.wait):
+            return False
+        line = red_along(self.scene, snapshot, self._ego.front)
+        return line < self._approach.ego_enter and holds(line, self._ego.front, self._ego.v)
 
     def _moment(self, time: float, programme: DriveProgramme) -> float:
         """The moment with the programme's phase that is nearest to a time, or was so before [s]."""

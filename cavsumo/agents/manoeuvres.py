@@ -12,6 +12,7 @@ from collections.abc import Callable, Iterator, Mapping
 from typing import ClassVar
 
 from cavsumo.agents.driving import HASTE_MPS2, RUN_OUT_M, Course, stopping_from
+from cavsumo.agents.red_lights import holds, red_along
 from cavsumo.agents.triggers import MARGIN, MAX_DECEL, REACTION_TIME, Trigger
 from cavsumo.model.bodies import NOOP, Action
 from cavsumo.model.carriageway import Approach
@@ -30,6 +31,7 @@ SQUEEZE_M = 20.0  # a lane that ends so soon after leaving the ego's ends beside
 STOPPING_M = 30.0  # so far before the end of its way it considers the end again
 ARRIVED_M = 0.3  # a body so near the axis of a lane is on it
 MOVING_OFF = 0.7  # an ego slower than this share of its speed limit that gains speed moves off
+BEFORE_LINE_M = 0.5  # it stops so far before a red light
 FAR_M = 30.0  # a run that leads into the ego's lane has ended after this
 
 
@@ -65,6 +67,7 @@ class Manoeuvre:
     """
 
     types: ClassVar[tuple[str, ...]]  # of approach on which it is possible
+    minds_ego: ClassVar[bool] = False  # whether it brakes for an ego that is ahead on its way
 
     def __init__(self, scene: Scene, approach: Approach, course: Course) -> None:
         self.scene, self.approach, self.course = scene, approach, course
@@ -77,7 +80,7 @@ class Manoeuvre:
         """Begin."""
 
     def act(self, state: BodyState, others: Iterator[BodyState]) -> Action:
-        """The next action; ``others`` are all but the ego."""
+        """The next action; ``others`` are all, without an ego that it does not mind."""
         raise NotImplementedError
 
     def over(self, state: BodyState) -> bool:
@@ -241,7 +244,18 @@ class Driver:
         if waits and not self._begun and here < self.approach.enter:
             left = min(left, self.approach.wait - here - state.v * dt)
             allowed = min(allowed, math.inf if hurry else self._unhurried(snapshot, here))
+        elif not waits:
+            left = min(left, self._to_light(snapshot, state) - state.v * dt)
         return self.course.drive(state, min(allowed, stopping_from(left, 0.0, dt)))
+
+    def _to_light(self, snapshot: Snapshot, state: BodyState) -> float:
+        """How far it is to a red light of the ego's way at which a vehicle ahead can stop [m]."""
+        if not self.scene.lights:
+            return math.inf
+        half = state.body.kind.length / 2
+        front = self.scene.ego_path.project(state.x, state.y).along + half
+        line = red_along(self.scene, snapshot, front)
+        return line - BEFORE_LINE_M - front if holds(line, front, state.v) else math.inf
 
     def _unhurried(self, snapshot: Snapshot, here: float) -> float:
         """The speed that leads to the ego's way no sooner than the ego to it [m/s]."""
@@ -276,7 +290,8 @@ class Driver:
     def act(self, snapshot: Snapshot, state: BodyState) -> Action:
         """The next action of the manoeuvre."""
         assert self.manoeuvre is not None
-        return self.manoeuvre.act(state, everybody(snapshot, state, ego=False))
+        others = everybody(snapshot, state, ego=self.manoeuvre.minds_ego)
+        return self.manoeuvre.act(state, others)
 
     def timing(self, aim: float) -> Trigger:
         """The trigger that times the manoeuvre by the ego's arrival."""

@@ -87,12 +87,15 @@ class DriveProgramme(NamedTuple):
 class Legs:
     """Progress of a manoeuvre of two legs.
 
+    Nobody drives into the side of an ego that is before him: that would be no test of the ego.
+
     Attributes:
         stands: whether the first leg has ended.
         second: whether the second one has begun.
     """
 
     stands = second = False
+    minds_ego = True
 
     def go_on(self) -> None:
         """Begin the second leg."""

@@ -16,7 +16,7 @@ import numpy as np
 
 from cavsumo.agents.casting import Cast, resolve_cast, teams
 from cavsumo.agents.manoeuvres import types_for
-from cavsumo.agents.names import EXPOSURE, SEARCH, SEARCH_METHODS
+from cavsumo.agents.names import EXPOSURE, SEARCH
 from cavsumo.assertions.specs import assertions_of
 from cavsumo.batch.plan_names import check_names
 from cavsumo.egos.base import Ego
@@ -38,9 +38,9 @@ from cavsumo.probability.exposure import exposure_of
 from cavsumo.probability.methods import check_episodes
 from cavsumo.results.present import input_files
 from cavsumo.results.provenance import checksums, traffic_checksum, unequal, versions
-from cavsumo.searchers.bounds import bounded
+from cavsumo.searchers.bounds import bounded, within_of
 from cavsumo.searchers.continued import SPACE, fingerprint
-from cavsumo.searchers.methods import check_method
+from cavsumo.searchers.methods import check_method, method_of, packages_of
 from cavsumo.searchers.space import Space, space_of
 from cavsumo.suites.cases import case_plan, case_plans, suite_inputs
 from cavsumo.sumo.options import OPTIONS
@@ -198,8 +198,8 @@ def _prepared(plan: BatchPlan, ego: Ego | None) -> PreparedBatch:
     prepared = PreparedBatch(plan, cast, site, *where, objects=objects)
     for member in cast:
         if member.name == SEARCH:  # a space without a start is refused too
-            space = bounded(prepared.space, str(member.params.get("within", "")))
-            check_method(str(member.params.get("method", SEARCH_METHODS[0])), space)
+            space = bounded(prepared.space, within_of(member.params))
+            check_method(method_of(member.params), space)
     return prepared
 
 
@@ -309,6 +309,7 @@ def approach_types(scenario: Scenario, kind: Kind, manoeuvres: Set[str]) -> tupl
 
 def manifest(prepared: PreparedBatch) -> dict[str, Any]:
     """The manifest: the data that make a batch reproducible."""
+    methods = [method_of(member.params) for member in prepared.cast if member.name == SEARCH]
     return {
         "command": ["cavsumo", *sys.argv[1:]],
         "plan": prepared.plan.model_dump(mode="json"),
@@ -319,6 +320,6 @@ def manifest(prepared: PreparedBatch) -> dict[str, Any]:
             **traffic_checksum(prepared.site),
             **({SPACE: fingerprint(prepared.space)} if prepared.cast.searchers else {}),
         },
-        "versions": dict(prepared.versions),
+        "versions": dict(prepared.versions) | versions(packages_of(methods)),
         "sumo_options": dict(OPTIONS),
     }

@@ -7,16 +7,17 @@ from pathlib import Path
 from typing import Any
 
 from cavsumo.agents.casting import params_of
-from cavsumo.agents.names import SEARCH, SEARCH_METHODS
+from cavsumo.agents.names import SEARCH
 from cavsumo.batch.prepared import PreparedBatch
 from cavsumo.batch.searching import Searching, SearchOrder
 from cavsumo.errors import ResultsError
 from cavsumo.model.scenario import BatchPlan
-from cavsumo.results.provenance import unequal
+from cavsumo.results.provenance import unequal, versions
 from cavsumo.results.reading import rows_of
 from cavsumo.results.recorded_plan import recorded_plan
-from cavsumo.searchers.bounds import bounded
+from cavsumo.searchers.bounds import bounded, within_of
 from cavsumo.searchers.continued import SPACE, fingerprint
+from cavsumo.searchers.methods import check_method, method_of, packages_of
 from cavsumo.searchers.protocol import GENERATION
 
 EARLIER = 2 * GENERATION  # points of an earlier search
@@ -43,16 +44,17 @@ def _search(
     ``later``: the files of the searches that begin with this one.
     """
     params = params_of(plan, label)
-    method = str(params.get("method", SEARCH_METHODS[0]))
-    order = SearchOrder(label, method, plan.seed, list(plan.cast).index(label), len(plan.agents))
-    space = bounded(prepared.space, str(params.get("within", "")))
+    order = SearchOrder(
+        label, method_of(params), plan.seed, list(plan.cast).index(label), len(plan.agents)
+    )
+    space = bounded(prepared.space, within_of(params))
     search = Searching(space, order)
     if not params.get("earlier"):
         return search
     file = prepared.plan.scenario.present(Path(str(params["earlier"])))
     if file in later:
         raise ResultsError(f"search.earlier {str(file)!r}: begins with itself")
-    earlier = _earlier(prepared, file, later, str(params.get("within", "")))
+    earlier = _earlier(prepared, file, later, within_of(params))
     sort = type(search.searcher.space)
     points = [point for space, point in earlier.best() if type(space) is sort]
     return Searching(space, order, points[:EARLIER])
@@ -67,7 +69,7 @@ def _earlier(
     if not labels:
         raise ResultsError(f"search.earlier {str(file)!r}: holds no search, only {plan.agents[0]}")
     _check(prepared, plan, manifest, f"search.earlier {str(file)!r}")
-    was = str(params_of(plan, labels[0]).get("within", ""))
+    was = within_of(params_of(plan, labels[0]))
     if was != within:
         raise ResultsError(
             f"search.earlier {str(file)!r}: is of another space: search.within was {was!r}, is "
@@ -89,7 +91,12 @@ def _check(
     prepared: PreparedBatch, plan: BatchPlan, manifest: Mapping[str, Any], name: str
 ) -> None:
     """Refuse an earlier search of another space, or of a version that chose other points."""
-    for package, (was, is_) in unequal(manifest["versions"], prepared.versions):
+    methods = [method_of(params_of(plan, k)) for k, agent in plan.cast.items() if agent == SEARCH]
+    for method in methods:
+        check_method(method, prepared.space)
+    for package, (was, is_) in unequal(manifest["versions"], versions(packages_of(methods))):
+        if was is None:
+            continue  # results of before it was recorded
         raise ResultsError(f"{name}: its points were chosen with {package} {was}, not {is_}")
     if manifest["sha256"].get(SPACE) == fingerprint(prepared.space):
         return

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
 
-from cavsumo.agents.names import AGENT_NAMES
+from cavsumo.agents.names import AGENT_NAMES, SEARCH_METHODS
 from cavsumo.assertions.names import ASSERTION_NAMES
 from cavsumo.egos.names import EGO_NAMES
 from cavsumo.egos.reference.names import REFERENCE_NAMES
@@ -18,5 +18,6 @@ CHOICES: Mapping[str, Callable[[], Iterable[str]]] = {
     "ego": lambda: EGO_NAMES,
     "kind of body": lambda: KINDS,
     "network": named_networks.names,
+    "search method": lambda: SEARCH_METHODS,
     "reference driver": lambda: (NO_REFERENCE, *REFERENCE_NAMES),
 }

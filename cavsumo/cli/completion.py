@@ -16,7 +16,8 @@ from cavsumo.cli.option_parser import OptionParser
 from cavsumo.model.scenario.fields import settings
 
 FILES = ("FILE", "PART", "RESULTS")  # placeholders of options that take a file
-SORTS = {"egos": "ego", "net": "network"}  # of names, by option, where the option is no setting
+# Sorts of names, by option, where the option is no setting.
+SORTS = {"egos": "ego", "net": "network", "method": "search method"}
 
 
 def script(parser: OptionParser, shell: str) -> str:

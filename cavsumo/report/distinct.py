@@ -1,24 +1,31 @@
 """The number of distinct tests and failures: cells of speed, side, place and kind of tester.
 
-Two tests are alike if they lie in the same cell. The number of cells not yet found is estimated
-from those found once (Good and Turing: Good 1953, Biometrika 40, 237) or once and twice (Chao 1984,
-Scand. J. Stat. 11, 265).
+Two tests are alike if they lie in the same cell. Side and place are those of the results
+(``from_side``, ``meets_m``), as a search counts its failures (``results.alike``); the speed is that
+of an impact, and of a test the closing speed at its trigger, from its trace. Results before 0.2
+lack the columns: there, all of it comes from the traces. The number of cells not yet found is
+estimated from those found once (Good and Turing: Good 1953, Biometrika 40, 237) or once and twice
+(Chao 1984, Scand. J. Stat. 11, 265).
 """
 
 from __future__ import annotations
 
+import math
 from collections import Counter
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import Any, NamedTuple
+
+import pandas
 
 from cavsumo.report.events import Described, Event
 from cavsumo.report.grouping import Group, Told
 from cavsumo.report.load import Batch
-from cavsumo.results.alike import PLACE_BIN_M, SPEED_BIN_MPS, bin_of
+from cavsumo.results.alike import FEATURES, PLACE_BIN_M, SPEED_BIN_MPS, bin_of, kind_of
 from cavsumo.results.failures import ORDER, failure_kind
 
 JUDGED = ("outcome", "avoidable")  # columns that say whether a failure was preventable
+USED = (*JUDGED, *FEATURES, "batch", "file", "run", "agent")
 
 
 class Cell(NamedTuple):
@@ -27,8 +34,9 @@ class Cell(NamedTuple):
     Attributes:
         setting: the setting, if there are several.
         kind: kind of tester.
-        side: of the ego.
-        speed, place: lower bounds of the closing speed [m/s] and of the ego's way so far [m].
+        side: from which the tester came; of old results the side of the ego where it was.
+        speed, place: lower bounds of the closing speed [m/s] and of where it meets the ego's path,
+            or of old results of the ego's way so far [m].
     """
 
     setting: str
@@ -99,18 +107,45 @@ def cell_of(event: Event, kind: str, setting: str) -> Cell | None:
     return Cell(setting, kind, event.side, speed, place)
 
 
+def failure_cell(row: Mapping[str, Any], test: Described, kind: str, setting: str) -> Cell | None:
+    """The cell of a failure, from its row; None when anything of it is not known."""
+    if _has_course(row):
+        speed, side, place = kind_of(row)
+        return Cell(setting, kind, side, speed, place)
+    return None if test.impact is None else cell_of(test.impact, kind, setting)
+
+
+def _test_cell(row: Mapping[str, Any], test: Described, kind: str) -> Cell | None:
+    """The cell of a test at its trigger; None when anything of it is not known."""
+    trigger = test.trigger
+    if _has_course(row):
+        trigger = trigger._replace(side=row["from_side"], place=row["meets_m"])
+    return cell_of(trigger, kind, "")
+
+
+def _has_course(row: Mapping[str, Any]) -> bool:
+    """Whether a row says from where the tester came."""
+    return bool(row["from_side"]) and not math.isnan(row["meets_m"])
+
+
 def distinct(group: Group, tests: Mapping[int, Described], batches: tuple[Batch, ...]) -> Distinct:
     """How different the tests and failures of a group are."""
     triggers, impacts, preventable = [], [], []
     rows = group.rows[group.rows["outcome"].isin(("held", "violated"))]
-    for row in rows[["batch", "avoidable"]].itertuples():
-        test = tests[int(row.Index)]
-        kind = batches[row.batch].plan.scenario.kind
-        triggers.append(cell_of(test.trigger, kind, ""))
-        if test.impact is not None:
-            impacts.append(cell_of(test.impact, kind, ""))
-            preventable += impacts[-1:] if row.avoidable == 1 else []
+    for index, row in _told(rows):
+        test, kind = tests[index], batches[row["batch"]].plan.scenario.kind
+        triggers.append(_test_cell(row, test, kind))
+        if row["outcome"] == "violated":
+            impacts.append(failure_cell(row, test, kind, ""))
+            preventable += impacts[-1:] if row["avoidable"] == 1 else []
     return Distinct(*group.whose, *map(diversity, (preventable, triggers, impacts)))
+
+
+def _told(rows: pandas.DataFrame) -> Iterator[tuple[int, dict[str, Any]]]:
+    """The index of each row, and what is used of it."""
+    cells = zip(*(rows[name] for name in USED), strict=True)
+    for index, values in zip(rows.index.tolist(), cells, strict=True):
+        yield index, dict(zip(USED, values, strict=True))
 
 
 def diversity(cells: Iterable[Cell | None]) -> Diversity:
@@ -134,14 +169,14 @@ def failure_cells(
     """The cells of all failures, those that were preventable most often first."""
     members: dict[Cell, list[tuple[int, str, int, str]]] = {}
     for group in groups:
-        rows = group.rows[group.rows["outcome"] == "violated"]
-        for row in rows[["batch", "file", "run", "agent", *JUDGED]].itertuples():
-            impact = tests[int(row.Index)].impact
-            kind = batches[row.batch].plan.scenario.kind
-            cell = cell_of(impact, kind, group.setting) if impact is not None else None
+        for index, row in _told(group.rows[group.rows["outcome"] == "violated"]):
+            kind = batches[row["batch"]].plan.scenario.kind
+            cell = failure_cell(row, tests[index], kind, group.setting)
             if cell is not None:
-                order = ORDER.index(failure_kind(row._asdict()))
-                members.setdefault(cell, []).append((order, row.file, int(row.run), row.agent))
+                order = ORDER.index(failure_kind(row))
+                members.setdefault(cell, []).append(
+                    (order, row["file"], int(row["run"]), row["agent"])
+                )
     found = [
         FailureCell(
             cell,

@@ -16,7 +16,7 @@ from cavsumo.batch.plan_names import searching
 from cavsumo.model.bodies import kind_named
 from cavsumo.report.grouping import Group, Told
 from cavsumo.report.load import Batch
-from cavsumo.results.alike import PLACE_BIN_M, SPEED_BIN_MPS, bin_of
+from cavsumo.results.alike import FEATURES, PLACE_BIN_M, bin_of, kind_of
 from cavsumo.results.failures import PREVENTABLE, UNPREVENTABLE, failure_kind
 
 SPEEDS = 4  # bins up to the top speed of the kind
@@ -134,14 +134,13 @@ def _cell(key: Any, rows: pandas.DataFrame) -> ExploredCell:
 
 def _alike(failures: pandas.DataFrame) -> list[AlikeFailures]:
     """Failures in groups that are alike."""
-    keys = [
-        failures["from_side"].astype(str),
-        failures["impact_speed_mps"].fillna(0.0).map(lambda v: bin_of(v, SPEED_BIN_MPS)),
-        failures["meets_m"].map(lambda at: bin_of(at, PLACE_BIN_M)),
-    ]
+    kinds_of = [kind_of(row) for row in failures[list(FEATURES)].to_dict("records")]
+    members: dict[tuple[float, str, float], list[int]] = {}
+    for index, kind in zip(failures.index, kinds_of, strict=True):
+        members.setdefault(kind, []).append(index)
     found = []
-    groups: Any = failures.groupby(keys, sort=True)
-    for (side, impact, place), rows in groups:
+    for impact, side, place in sorted(members):
+        rows = failures.loc[members[impact, side, place]]
         speeds = rows["tester_speed_mps"].dropna()
         kinds = [failure_kind({"outcome": "violated", "avoidable": a}) for a in rows["avoidable"]]
         alike = AlikeFailures(

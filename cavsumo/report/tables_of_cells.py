@@ -58,7 +58,7 @@ def failures_table(report: Report) -> Table:
         words = [cell.setting, *words] if settings else words
         counts = (one.preventable, one.count - one.preventable) if judged else (one.count,)
         rows.append([*words, speed, place, *map(str, counts), run])
-    words = ["tester", "hit on", "found by"]
+    words = ["tester", "from", "found by"]
     notes = []
     if len(found) > SHOWN:
         rest = sum(one.count for one in found[SHOWN:])
@@ -67,7 +67,7 @@ def failures_table(report: Report) -> Table:
         notes.append(f"{many(rest, 'failure')} in {cells} {are} not shown.")
     notes.append(f"To see one: cavsumo replay {'RESULTS' if several else found[0].file} RUN")
     kinds = ("preventable", "others") if judged else ("failures",)
-    numbers = ("at [m/s]", "after [m]", *kinds, "run")
+    numbers = ("at [m/s]", "met at [m]", *kinds, "run")
     words = ["setting", *words] if settings else words
     title = "Failures by cell, the most frequent first"
     title = "Failures by cell, those most often preventable first" if judged else title

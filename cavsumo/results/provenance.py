@@ -34,9 +34,9 @@ def checksums(scenario: Scenario, agent_files: Iterable[Path]) -> dict[str, str]
     return {name: checksum(file) for name, file in found.items()}
 
 
-def versions() -> dict[str, str]:
-    """The versions of the packages on which results depend."""
-    packages = ("libsumo", "sumolib", "numpy", "shapely")
+def versions(more: Iterable[str] = ()) -> dict[str, str]:
+    """The versions of the packages on which results depend: on those always, and on more."""
+    packages = ("libsumo", "sumolib", "numpy", "shapely", *more)
     return {"cavsumo": __version__, "python": platform.python_version()} | {
         name: importlib.metadata.version(name) for name in packages
     }
@@ -65,8 +65,10 @@ def changes(recorded: Mapping[str, Any], now: Mapping[str, Any]) -> Iterator[str
     """The changes around an unchanged plan: versions, files, SUMO's options."""
     for part in ("versions", "sha256", "sumo_options"):
         for name, (was, is_) in unequal(recorded.get(part) or {}, now[part]):
-            if part == "sha256" and was is None:
-                continue  # the ego wrote it since; it was not an input
+            # The ego wrote the file since; it was not an input. And the package chose the points of
+            # a search: an episode does not depend on it, and earlier results did not name it.
+            if part in ("sha256", "versions") and was is None:
+                continue
             yield f"{part}: {name} was {was}, is {is_}"
 
 

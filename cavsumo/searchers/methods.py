@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
+from typing import Any
 
 import numpy as np
 
+from cavsumo.agents.names import SEARCH_METHODS
 from cavsumo.errors import InputError
 from cavsumo.model.bodies import WALKING
 from cavsumo.searchers.bounds import MEETS, SIDE, bounds_numbers
@@ -21,6 +23,8 @@ from cavsumo.searchers.space import Space
 from cavsumo.searchers.tree import TreeSearch
 
 BY_DECISIONS = ("tree", "explore")
+# Packages that choose points, besides numpy.
+PACKAGES = {"portfolio": ("cma",), "cma": ("cma",), "diversity": ("cma", "ribs")}
 
 
 def _neighbours(space: Space, rng: np.random.Generator) -> Searcher:
@@ -48,6 +52,16 @@ SEARCHERS: Mapping[str, Callable[[Space, np.random.Generator], Searcher]] = {
 def searcher_of(method: str, space: Space, rng: np.random.Generator) -> Searcher:
     """The searcher of a method."""
     return SEARCHERS[method](space, rng)
+
+
+def method_of(params: Mapping[str, Any]) -> str:
+    """The method of a search, from the parameters of its agent."""
+    return str(params.get("method", SEARCH_METHODS[0]))
+
+
+def packages_of(methods: Iterable[str]) -> list[str]:
+    """The packages that choose the points of these methods, besides numpy."""
+    return sorted({package for method in methods for package in PACKAGES.get(method, ())})
 
 
 def check_method(method: str, space: Space) -> None:

@@ -103,12 +103,15 @@ def test_rare_events(play: Play) -> None:
 def test_estimators(play: Play) -> None:
     """Two replications of each method on each function; probabilities are known."""
     _, *found = play("estimators", "--replications", "2", "--episodes", "200").splitlines()
-    assert [row.split()[2] for row in found[:5]] == [
-        "auto", "monte-carlo", "importance", "sobol", "subset",
+    assert [row.split()[2] for row in found[:6]] == [
+        "auto", "monte-carlo", "stratified", "importance", "sobol", "subset",
     ]  # fmt: skip
+    words = "--replications", "2", "--half-width", "5", "--method", "monte-carlo"
+    _, early = play("estimators", *words, "--function", "corners").splitlines()
+    assert float(early.split()[7]) < 2000
     assert {row.split()[0]: row.split()[1] for row in found} == {
         "corner": "1.0e-04", "corners": "1.0e-03", "ball": "1.2e-04", "scattered": "1.0e-03",
-        "pedestrian": found[-1].split()[1],
+        "pedestrian": found[-7].split()[1], "lights": "2.1e-03",
     }  # fmt: skip
 
 
@@ -151,10 +154,14 @@ def test_un_r157(play: Play) -> None:
 
 
 def test_searched_vehicles(play: Play) -> None:
-    """A line for each agent."""
-    said = play("searched_vehicles", "--kind", "bicycle", "--ego", "constant", "--runs", "2")
-    cells = [[cell.strip() for cell in line.split("|")[1:5]] for line in said.splitlines()[2:]]
-    assert cells == [["crossing", "bicycle", "constant", agent] for agent in ("search", "timing")]
+    """A line for each tester; nobody reaches a conclusion in two episodes."""
+    wanted = ["--tester", "search:random", "--tester", "timing", "--runs", "2", "--seed", "1"]
+    crossing = str(ROOT / "networks" / "crossing.net.xml")
+    lines = play("searched_vehicles", crossing, "--kind", "bicycle", *wanted).splitlines()[2:]
+    cells = [line.split()[:5] for line in lines]
+    names = [["crossing", "bicycle", tester] for tester in ("search:random", "timing")]
+    assert [row[:3] for row in cells] == names
+    assert all(row[3] in ("0/1", "1/1") for row in cells)
 
 
 def test_ast_crosswalk(play: Play) -> None:
@@ -331,6 +338,20 @@ def test_exports(play: Play) -> None:
     assert read == there
     if shutil.which("esmini"):
         assert (places > 100, same) == (True, 1)
+
+
+def test_transfer(play: Play) -> None:
+    """One test at one place, in each form."""
+    said = play(
+        "transfer", "--tests", "1", "--runs", "8", "--places", "1", "--seeds", "1",
+        "--net", "crossing",
+    )  # fmt: skip
+    lines = said.splitlines()
+    assert lines[0].startswith("1 minimal tests")
+    assert [line.split("|")[1:3] for line in lines[3::2]] == [
+        [" crossing, in the zone ", " 1 "],
+        [" crossing, in the phase ", " 1 "],
+    ]
 
 
 def test_overlaps(play: Play) -> None:

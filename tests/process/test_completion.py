@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 from inline import cavsumo
 
-from cavsumo.agents.names import AGENT_NAMES
+from cavsumo.agents.names import AGENT_NAMES, SEARCH_METHODS
 from cavsumo.assertions.names import ASSERTION_NAMES
 from cavsumo.egos.names import EGO_NAMES
 from cavsumo.egos.reference.names import REFERENCE_NAMES
@@ -40,6 +40,9 @@ COMPLETED = {
     "cavsumo certify re": {"results.csv"},
     "cavsumo certify results.csv 0 --egos tim": {"time-gap"},
     "cavsumo check-ego con": {"constant"},
+    "cavsumo search --method ": {*SEARCH_METHODS},
+    "cavsumo search --net cr": {"crossing", "cross.net.xml"},
+    "cavsumo estimate --method mon": {"monte-carlo"},
     "cavsumo inspect ju": {"junction"},
     "cavsumo report --format mark": {"markdown"},
     "cavsumo game solve --reading ": {"A", "B", "C"},

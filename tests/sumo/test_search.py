@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import json
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -184,6 +185,28 @@ def test_an_earlier_search_of_another_space_is_refused(
     assert _search(file, "--param", f"search.earlier={found}", *more) == Exit.USAGE
     assert said in capsys.readouterr().err
     assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize("method", ["portfolio", "random"])
+def test_the_packages_that_chose_the_points_are_recorded(
+    method: str, tmp_path: Path, capsys: Capture
+) -> None:
+    """Another version of them continues no search, and chose other points of an earlier one."""
+    file = _folder(tmp_path / "r")
+    assert _search(file, "--method", method, "--exit-zero", runs=1) == Exit.OK
+    manifest = file.with_suffix(".json")
+    recorded = json.loads(manifest.read_text(encoding="utf-8"))
+    assert ("cma" in recorded["versions"]) is (method == "portfolio")
+    assert main(["replay", str(file), "0"]) == Exit.OK
+    assert "cma" not in capsys.readouterr().err
+    recorded["versions"]["cma"] = "0.1"
+    manifest.write_text(json.dumps(recorded), encoding="utf-8")
+    again = ["--method", method, "--exit-zero"]
+    assert _search(file, *again, "--resume", runs=2) == Exit.USAGE
+    assert "versions: cma was 0.1, is" in capsys.readouterr().err
+    other = tmp_path / "no.csv"
+    assert _search(other, "--param", f"search.earlier={file}", *again) == Exit.USAGE
+    assert "its points were chosen with cma 0.1, not" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(

@@ -10,6 +10,9 @@ from report_files import FAILED, HELD, NOTHING, UNFAIR, write
 
 from cavsumo.report.analysis import analyse
 from cavsumo.report.explored import AlikeFailures, ExploredCell
+from cavsumo.results.alike import kind_of
+from cavsumo.results.failures import graded
+from cavsumo.results.reading import rows_of
 
 
 def _test(outcome: str, grade: float, side: str, speed: float | None, place: float) -> Any:
@@ -46,3 +49,20 @@ def test_only_searches_are_mapped(tmp_path: Path) -> None:
     """And results that have no places have no map."""
     assert analyse([write(tmp_path / "b.csv", PLAYED, agents=["timing"])]).explored == []
     assert analyse([write(tmp_path / "c.csv", [[HELD]], agents=["search"])]).explored == []
+
+
+def test_the_report_counts_failures_as_a_search_does(tmp_path: Path) -> None:
+    """Its table of cells, its figures, the groups on its page: by the rows, without traces."""
+    more = [_test(FAILED, 0.5, "left", 1.0, 12.0), _test(FAILED, 0.7, "right", 1.0, 49.0)]
+    file = write(tmp_path / "a.csv", [*PLAYED, *more], agents=["search"])
+    report = analyse([file])
+    kinds = {kind_of(row) for row in rows_of(file) if row["outcome"] == FAILED}
+    preventable = {kind_of(row) for row in rows_of(file) if graded(row)[1]}
+    (found,), (counted,) = report.explored, report.distinct
+    assert len(kinds) == 2
+    assert {(one.impact, one.side, one.place) for one in found.failures} == kinds
+    cells = {(one.cell.speed, one.cell.side, one.cell.place) for one in report.failures}
+    assert cells == kinds
+    assert (counted.failures.known, counted.failures.cells) == (4, len(kinds))
+    assert counted.preventable.cells == len(preventable)
+    assert sum(one.preventable > 0 for one in found.failures) == len(preventable)
