@@ -172,9 +172,10 @@ def _imported(file: Path, net: str, trace: Trace) -> bool:
 def alike(one: Mapping[str, Any], other: Mapping[str, Any]) -> bool:
     """Whether the same bodies are in two frames, at the same places to 1e-6."""
     a, b = ({(part, name): pose for part, name, pose in states(f)} for f in (one, other))
-    return one["time_s"] == other["time_s"] and a.keys() == b.keys() and all(
-        abs(x - y) < 1e-6 for name in a for x, y in zip(a[name], b[name], strict=True)
-    )  # fmt: skip
+    if one["time_s"] != other["time_s"] or a.keys() != b.keys():
+        return False
+    apart = [[x - y for x, y in zip(a[name], b[name], strict=True)] for name in a]
+    return all(max(map(abs, (x, y, v, math.remainder(o, math.tau)))) < 1e-6 for x, y, v, o in apart)
 
 
 def _check(found: Found, folders: Sequence[Path], python: str) -> None:
