@@ -122,6 +122,17 @@ def test_estimates(play: Play) -> None:
     assert [row.split()[0] for row in methods] == ["auto", "monte-carlo"]
 
 
+def test_drivers_under_an_exposure(play: Play, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Two drivers, ten episodes each."""
+    monkeypatch.syspath_prepend(str(ROOT / "experiments" / "search"))
+    monkeypatch.setenv("PYTHONPATH", str(ROOT / "experiments" / "search"))
+    words = "--net", "pedestrians", "--ego", "constant", "--ego", "faulty_drivers:Careful"
+    _, _, *rows = play("exposed_drivers", *words, "--max-episodes", "10").splitlines()
+    assert [row.split(" | ")[0] for row in rows] == ["| constant", "| Careful"]
+    assert all(row.split(" | ")[2] == "10" for row in rows)
+    assert rows[1].split(" | ")[3] == "0"
+
+
 def test_reference_tracks(play: Play) -> None:
     """One cell: the largest differences are within the tolerances."""
     test, everything = play("reference_tracks", "--only", "CPFA/60/50").splitlines()[1:]
