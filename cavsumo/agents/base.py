@@ -117,6 +117,10 @@ class Agent:
         """
         return False
 
+    def stops(self) -> bool:
+        """Whether the test that it plays is over, so that the episode ends."""
+        return False
+
     def recall(self) -> Any:
         """The knowledge of the agent, as plain data; None when it does not learn."""
         return None

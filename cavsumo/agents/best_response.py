@@ -21,23 +21,25 @@ import numpy as np
 from cavsumo.agents.avoidance import Avoidance
 from cavsumo.agents.base import AGENTS, Agent, learner_of
 from cavsumo.agents.planning.coordinates import Coordinates, Relative
+from cavsumo.agents.planning.grid import (
+    ZETAS,
+    States,
+    braking,
+    scale,
+)
+from cavsumo.agents.planning.moves import (
+    STAND,
+    WALK,
+    Aim,
+    Prices,
+)
 from cavsumo.agents.planning.opponent import (
     AccelerationReader,
     Counts,
     acceleration_class,
     situation,
 )
-from cavsumo.agents.planning.response import (
-    STAND,
-    WALK,
-    ZETAS,
-    Aim,
-    Plan,
-    Prices,
-    States,
-    braking,
-    scale,
-)
+from cavsumo.agents.planning.response import Plan
 from cavsumo.agents.triggers import Timing, time_to_walk
 from cavsumo.agents.walking import ApproachKerb, CrossingWalk, walk
 from cavsumo.model.bodies import NOOP, Action, Kind

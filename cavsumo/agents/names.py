@@ -36,7 +36,7 @@ AGENT_NAMES = Names(
         "proximity": "distance_m idle manoeuvre",
         "q-learning": "alpha gamma epsilon half_life hold_s weights learn",
         "random": "rate_per_s epsilon between",
-        "search": "method cut earlier",
+        "search": "method cut within earlier",
         "timing": "aim idle manoeuvre",
     },
 )

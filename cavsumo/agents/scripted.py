@@ -7,7 +7,8 @@ speed, so the speed for a timestep is the mean over the timestep after it::
 
 and the body is at s(t) exactly at every timestep. Before its programme begins it stands or keeps
 its speed. When it has to begin is computed from the ego's place and speed until that moment; then
-it is fixed. A body with a track is where the track has it, from the ego's entry on.
+it is fixed. A body with a track is where the track has it, from the ego's entry on. A storyboard
+moves the bodies that have neither (``agents.storyboard``).
 """
 
 from __future__ import annotations
@@ -19,13 +20,16 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from cavsumo.agents.base import AGENTS, Agent
+from cavsumo.agents.story_conditions import BoardView
+from cavsumo.agents.storyboard import StoryBody, StoryRun
 from cavsumo.errors import AgentError, EgoError
 from cavsumo.model.bodies import Action
 from cavsumo.model.curve import PlaneCurve
 from cavsumo.model.kinematics import step_floats, wrap
 from cavsumo.model.motion import Motion
 from cavsumo.model.scenario.script import Begins, Programme, ScriptedTest
-from cavsumo.model.scenario.track import ScriptedTrack
+from cavsumo.model.scenario.storyboard import EGO
+from cavsumo.model.scenario.track import Place, ScriptedTrack
 from cavsumo.model.scene import Scene
 from cavsumo.model.snapshot import BodyState, Snapshot
 
@@ -43,9 +47,16 @@ class ScriptedAgent(Agent):
     def reset(self, scene: Scene, owned: Sequence[int], rng: np.random.Generator) -> None:
         super().reset(scene, owned, rng)
         self._script, self._checked = scene.script, False
+        self._story: StoryRun | None = None
         if scene.script is not None:
             testers, begins = scene.script.testers, scene.script.commitments
             self._followers = [_follower(testers[i], begins[i], scene.dt) for i in owned]
+            if scene.script.board is not None:
+                self._story = StoryRun(scene.script, scene.dt)
+                self._followers = [
+                    StoryFollower(self._story.bodies[i], scene.dt) if _free(testers[i]) else one
+                    for i, one in zip(owned, self._followers, strict=True)
+                ]
 
     def choose_action(self, snapshot: Snapshot) -> tuple[Action, ...]:
         if self._script is None:
@@ -54,10 +65,24 @@ class ScriptedAgent(Agent):
         if not self._checked and snapshot.time >= HOLDS_S - 1e-9:
             self._checked = True
             check_approach(self._script, v)
+        if self._story is not None:
+            self._story.advance(seen_in(self._story, self._script, snapshot, front))
         return tuple(
             follower.action(snapshot.testers[i], snapshot.time, front, v)
             for i, follower in zip(self.owned, self._followers, strict=True)
         )
+
+    def stops(self) -> bool:
+        return self._story is not None and self._story.stopped
+
+
+def seen_in(story: StoryRun, script: ScriptedTest, snapshot: Snapshot, front: float) -> BoardView:
+    """The state of a timestep for the conditions of a storyboard."""
+    ego, testers = snapshot.ego, snapshot.testers
+    states = {EGO: ego} | {f"tester{i}": state for i, state in enumerate(testers)}
+    gone = {body.id: body.along(snapshot.time)[0] for body in story.bodies}
+    gone[EGO] = front - script.ego.start_m
+    return BoardView(snapshot.time, front, ego.v, states, gone, story.board.axles_m)
 
 
 def check_approach(script: ScriptedTest, v: float) -> None:
@@ -76,8 +101,12 @@ def front_of_ego(script: ScriptedTest, scene: Scene, snapshot: Snapshot) -> floa
     half = ego.body.kind.length / 2
     axle = approach.axle(ego.body.kind.length)
     back = axle - half  # of the point that follows the way, from the centre
-    here = scene.ego_path.project(ego.x - back * math.cos(ego.o), ego.y - back * math.sin(ego.o))
-    return approach.start_m - half + here.along + axle
+    x, y = ego.x - back * math.cos(ego.o), ego.y - back * math.sin(ego.o)
+    along = scene.ego_path.project(x, y).along
+    if along == 0.0:  # the path begins at the ego's centre, and an axle is behind that
+        x0, y0, o = scene.ego_path.at(0.0)
+        along = (x - x0) * math.cos(o) + (y - y0) * math.sin(o)
+    return approach.start_m - half + along + axle
 
 
 @dataclass
@@ -114,11 +143,7 @@ class Follower:
         begins, dt = self.begins, self.dt
         if begins is not None and self.begun == math.inf:
             self._commit(begins, time, front, v)
-        here, there = self.along(time + dt), self.along(time + 2 * dt)
-        throttle = ((there - here) / dt - state.v) / dt
-        steers = self.curve.legs and state.v > 0.0
-        steering = steering_to(state, *self.curve.at(here)[:2], self.dt) if steers else 0.0
-        return Action(throttle, steering)
+        return _on_way(self.curve, state, self.along(time + dt), self.along(time + 2 * dt), dt)
 
     def _commit(self, begins: Begins, time: float, front: float, v: float) -> None:
         """Fix the beginning if it lies within the two timesteps that are decided now."""
@@ -158,16 +183,58 @@ class TrackFollower:
 
     def action(self, state: BodyState, time: float, front: float, v: float) -> Action:
         """The action of a timestep; the ego is not looked at."""
-        kind, dt = state.body.kind, self.dt
-        steering = steering_to(state, *self.track.at(time + dt), dt) if state.v > 0.0 else 0.0
-        limits = kind.wheelbase, kind.v_min, kind.v_max, dt
-        x, y, *_ = step_floats(*state[1:], 0.0, steering, *limits)
-        # Who fell behind in a sharp turn catches up as fast as the track is anywhere.
-        wanted = min(kind.v_max, math.dist((x, y), self.track.at(time + 2 * dt)) / dt)
-        return Action((wanted - state.v) / dt, steering)
+        dt = self.dt
+        return _to_places(state, self.track.at(time + dt), self.track.at(time + 2 * dt), dt)
 
 
-def _follower(programme: Programme, begins: Begins | None, dt: float) -> Follower | TrackFollower:
+@dataclass
+class StoryFollower:
+    """One body of a storyboard in one episode.
+
+    Attributes:
+        body: where it is at any time that is decided.
+        dt: length of a timestep [s].
+    """
+
+    body: StoryBody
+    dt: float
+
+    def action(self, state: BodyState, time: float, front: float, v: float) -> Action:
+        """The action of a timestep, whose motion the storyboard has decided."""
+        body, dt = self.body, self.dt
+        if body.track is not None and time + 2 * dt > body.since:
+            return _to_places(state, body.place(time + dt), body.place(time + 2 * dt), dt)
+        here, there = (body.along(time + k * dt)[0] for k in (1, 2))
+        return _on_way(body.curve, state, here, there, dt)
+
+
+def _on_way(curve: PlaneCurve, state: BodyState, here: float, there: float, dt: float) -> Action:
+    """The action of a body that will be at two distances on its way at the next timesteps."""
+    throttle = ((there - here) / dt - state.v) / dt
+    steers = curve.legs and state.v > 0.0
+    steering = steering_to(state, *curve.at(here)[:2], dt) if steers else 0.0
+    return Action(throttle, steering)
+
+
+def _to_places(state: BodyState, here: Place, there: Place, dt: float) -> Action:
+    """The action of a body that will be at two places at the next timesteps."""
+    kind = state.body.kind
+    steering = steering_to(state, *here, dt) if state.v > 0.0 else 0.0
+    limits = kind.wheelbase, kind.v_min, kind.v_max, dt
+    x, y, *_ = step_floats(*state[1:], 0.0, steering, *limits)
+    # Who fell behind in a sharp turn catches up as fast as the track is anywhere.
+    wanted = min(kind.v_max, math.dist((x, y), there) / dt)
+    return Action((wanted - state.v) / dt, steering)
+
+
+def _free(programme: Programme) -> bool:
+    """Whether a storyboard moves a body."""
+    return programme.track is None and programme.begins is None
+
+
+def _follower(
+    programme: Programme, begins: Begins | None, dt: float
+) -> Follower | TrackFollower | StoryFollower:
     """The follower of a body in one episode."""
     if programme.track is not None:
         return TrackFollower(programme.track, dt)

@@ -36,16 +36,19 @@ class SearchAgent(Agent):
     PARAMETERS: ClassVar[Mapping[str, str]] = {
         "method": f"how points are chosen: {', '.join(SEARCH_METHODS)} (docs/search.md)",
         "cut": "end an episode once the ego has left all bodies behind; false to play on",
+        "within": "bounds of the space, such as speed=0.3:0.8,side=left (docs/search.md)",
         "earlier": "results of an earlier search of the same space, whose best points come first",
     }
     FILES = ("earlier",)
     sees_background = False
     searches = True
 
-    def __init__(self, method: str = "portfolio", cut: bool = True, earlier: str = "") -> None:
+    def __init__(
+        self, method: str = "portfolio", cut: bool = True, within: str = "", earlier: str = ""
+    ) -> None:
         if method not in SEARCH_METHODS:
             raise UnknownName("method", method, SEARCH_METHODS, f"agent {SEARCH}")
-        self.method, self.earlier = method, earlier
+        self.method, self.within, self.earlier = method, within, earlier
         self.cut = truth("cut", cut)
         self._programmes: list[Programme | Decisions | None] = []
         self._fellows: Sequence[SearchAgent] = ()

@@ -21,6 +21,7 @@ from cavsumo.model.objects import SentObject
 from cavsumo.model.scenario import Scenario
 from cavsumo.model.scenario_file import read_config
 from cavsumo.model.study import Part, overruled, read_study
+from cavsumo.openscenario.parts import ScenarioChoice, scenario_parts
 
 FILE = "results.csv"  # of results without an output file
 
@@ -29,6 +30,10 @@ def run(
     net: str | os.PathLike[str] | Scenario | None = None,
     *,
     config: str | os.PathLike[str] | None = None,
+    scenario: str | os.PathLike[str] | None = None,
+    scenario_params: Mapping[str, Any] | None = None,
+    scenario_root: str | os.PathLike[str] | None = None,
+    scenario_ego: str = "Ego",
     output: str | os.PathLike[str] | None = None,
     jobs: int | None = None,
     executor: Any = None,
@@ -44,6 +49,11 @@ def run(
     Args:
         net: a network's name or file (default: the crossing), or a whole scenario.
         config: a scenario file (TOML) of one scenario; the keywords win.
+        scenario: a published scenario (OpenSCENARIO XML, docs/published-scenarios.md), in place of
+            a network and testers.
+        scenario_params: values of its parameters, by name.
+        scenario_root: the folder that its files may come from; its own if not given.
+        scenario_ego: the name of its entity under test.
         output: the results file (.csv), with manifest and traces beside it. Without it the results
             lie in a temporary folder until the ``Results`` are gone, or the process ends.
         jobs: episodes at a time (default 1), in processes of their own.
@@ -69,6 +79,18 @@ def run(
     if config is not None:
         given = overruled(read_config(Path(config)), given)
     part = Part("", given, {"net": DEFAULT})
+    if scenario is not None:
+        if config is not None:
+            raise InputError("run: config: scenario names another scenario; give one of them")
+        values = {name: f"{value}" for name, value in (scenario_params or {}).items()}
+        root = None if scenario_root is None else Path(scenario_root)
+        read = scenario_parts(ScenarioChoice(Path(scenario), values, root, scenario_ego), given)
+        if len(read.parts) != 1:
+            raise InputError(
+                f"run: scenario {os.fspath(scenario)!r}: has {len(read.parts)} variations; "
+                "scenario_params of the scenario itself play one"
+            )
+        (part,), places = read.parts, read.places
     manner = Manner(resume, retry_errors, overwrite, quiet=not (progress and is_shown()))
     order = Order((part,), manner, means_of(jobs, executor, scheduler), places=places)
     (found,) = results_of(order, output, objects)

@@ -15,8 +15,10 @@ from cavsumo.model.scenario import BatchPlan
 from cavsumo.results.provenance import unequal, versions
 from cavsumo.results.reading import rows_of
 from cavsumo.results.recorded_plan import recorded_plan
+from cavsumo.searchers.bounds import bounded
 from cavsumo.searchers.continued import SPACE, fingerprint
-from cavsumo.searchers.methods import check_method, method_of, packages_of
+from cavsumo.searchers.diversity import check_installed
+from cavsumo.searchers.methods import DIVERSITY, method_of, packages_of
 from cavsumo.searchers.protocol import GENERATION
 
 EARLIER = 2 * GENERATION  # points of an earlier search
@@ -43,28 +45,36 @@ def _search(
     ``later``: the files of the searches that begin with this one.
     """
     params = params_of(plan, label)
-    order = SearchOrder(
-        label, method_of(params), plan.seed, list(plan.cast).index(label), len(plan.agents)
-    )
-    search = Searching(prepared.space, order)
+    turn, agents = list(plan.cast).index(label), len(plan.agents)
+    order = SearchOrder(label, method_of(params), plan.seed, turn, agents)
+    space = bounded(prepared.space, str(params.get("within", "")))
+    search = Searching(space, order)
     if not params.get("earlier"):
         return search
     file = prepared.plan.scenario.present(Path(str(params["earlier"])))
     if file in later:
         raise ResultsError(f"search.earlier {str(file)!r}: begins with itself")
-    earlier = _earlier(prepared, file, later)
+    earlier = _earlier(prepared, file, later, str(params.get("within", "")))
     sort = type(search.searcher.space)
     points = [point for space, point in earlier.best() if type(space) is sort]
-    return Searching(prepared.space, order, points[:EARLIER])
+    return Searching(space, order, points[:EARLIER])
 
 
-def _earlier(prepared: PreparedBatch, file: Path, later: tuple[Path, ...]) -> Searching:
-    """An earlier search of the same space, told of its rows."""
+def _earlier(
+    prepared: PreparedBatch, file: Path, later: tuple[Path, ...], within: str
+) -> Searching:
+    """An earlier search of the same space within the same bounds, told of its rows."""
     plan, manifest = recorded_plan(file)
     labels = [label for label, name in plan.cast.items() if name == SEARCH]
     if not labels:
         raise ResultsError(f"search.earlier {str(file)!r}: holds no search, only {plan.agents[0]}")
     _check(prepared, plan, manifest, f"search.earlier {str(file)!r}")
+    was = str(params_of(plan, labels[0]).get("within", ""))
+    if was != within:
+        raise ResultsError(
+            f"search.earlier {str(file)!r}: is of another space: search.within was {was!r}, is "
+            f"{within!r}"
+        )
     search = _search(prepared, plan, labels[0], (*later, file))
     _tell(search, rows_of(file))
     return search
@@ -82,8 +92,8 @@ def _check(
 ) -> None:
     """Refuse an earlier search of another space, or of a version that chose other points."""
     methods = [method_of(params_of(plan, k)) for k, agent in plan.cast.items() if agent == SEARCH]
-    for method in methods:
-        check_method(method, prepared.space)
+    if DIVERSITY in methods:
+        check_installed()
     for package, (was, is_) in unequal(manifest["versions"], versions(packages_of(methods))):
         if was is None:
             continue  # results of before it was recorded

@@ -1,77 +1,101 @@
-"""A trace as OpenSCENARIO XML 1.2 with OpenDRIVE: everybody follows the recorded track.
+"""A trace as OpenSCENARIO XML 1.2 with OpenDRIVE (``opendrive``).
 
-The road is made by netconvert, in the coordinates of the network. A vehicle's reference point is
-the middle of its rear axle, as the standard has it; ours is the middle of its box, half a wheelbase
-before the axle. A pedestrian's is the middle of its box in both. Bodies that are not there from the
-beginning to the end are left out.
+*recorded*: everybody follows the recorded track by the clock. *test*: the ego begins as recorded
+and is left to the controller of the player; each tester moves until it last stands, waits there
+until the ego has come as far as it had when the tester set off, and then follows its track once,
+without regard to the ego; at the end of the record it goes straight on. That is the rule by which
+``regress --testers policy`` plays it. The background follows the clock until the record ends.
+
+A vehicle's reference point is the middle of its rear axle, as the standard has it; ours is the
+middle of its box, half a wheelbase before the axle. A pedestrian's is the middle of its box in
+both. Bodies that enter late or leave early are added and deleted then.
 """
 
 from __future__ import annotations
 
-import datetime
+import json
 import math
-import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import TYPE_CHECKING, Any
+from typing import Any, NamedTuple
 
 from cavsumo import __version__
 from cavsumo.errors import InputError
-from cavsumo.model.bodies import BICYCLE, BUS, PEDESTRIAN
-from cavsumo.network.drawing.surfaces import credit
-from cavsumo.network.osm.netconvert import (
-    in_comment,
-    netconvert,
-    netconvert_version,
-    with_notice,
+from cavsumo.interop.head import HEAD, head_of
+from cavsumo.interop.opendrive import UNDATED, XODR, roads_of
+from cavsumo.interop.storyboard_parts import (
+    at_time,
+    ego_has_come,
+    entity,
+    event,
+    follow,
+    group,
+    position,
+    standing_speed,
 )
-from cavsumo.results.traces import Shape, Trace, states
+from cavsumo.interop.tracks import Stays, TrackPoint, at_axle, driven, moved, set_off, stays
+from cavsumo.model.polyline import Path as Polyline
+from cavsumo.network.drawing.surfaces import credit
+from cavsumo.results.traces import Trace
 
-if TYPE_CHECKING:
-    from scenariogeneration import xosc
-
-XOSC, XODR = "test.xosc", "test.xodr"
+XOSC = "test.xosc"
 MINOR = 2  # of the version of OpenSCENARIO
 EXTRA = "pip install 'cavsumo[export]'"
-HEIGHT_M = {PEDESTRIAN.name: 1.7, BICYCLE.name: 1.7, BUS.name: 3.2}
-CAR_HEIGHT_M = 1.5
-UNDATED = datetime.datetime(2000, 1, 1)  # so that the same test gives the same bytes
-PEDESTRIAN_KG = 75.0
-HELD_S = 0.001  # for how long around a timestep a heading is held
-Track = Sequence[tuple[float, float, float, float]]  # time [s], x, y [m], heading [rad]
+RECORDED, TEST = "recorded", "test"
+WAYS = (RECORDED, TEST)
+STRAIGHT_ON_S = 10.0  # for which a tester goes straight on behind the end of the record
+WAYPOINTS_M = 20.0  # from one to the next
+HALF = 0.5  # of a timestep before its first frame a body enters, and stands there
 
 
-def write_openscenario(trace: Trace, net: Path, folder: Path) -> list[str]:
-    """Write ``test.xosc`` and ``test.xodr`` into a folder; the ids of bodies that were left out.
+class ExportPlace(NamedTuple):
+    """The place of an episode.
 
-    Raises InputError when a package is missing, or a file cannot be made; the scenario is written
-    last.
+    Attributes:
+        net: the network's file.
+        path: the ego's path, from where its middle starts to where its front arrives.
+        horizon: how long an episode may last [s].
     """
-    library = _library()
+
+    net: Path
+    path: Polyline
+    horizon: float
+
+
+def write_openscenario(trace: Trace, place: ExportPlace, folder: Path, way: str = RECORDED) -> None:
+    """Write ``test.xosc`` and ``test.xodr`` into a folder.
+
+    Args:
+        way: RECORDED or TEST.
+
+    Raises InputError when a package is missing, or a file cannot be made; then none is written.
+    """
+    xosc, notice = _library(), credit(place.net)
     if not folder.is_dir():
         raise InputError(f"--output {str(folder)!r}: no such folder")
-    whole, partial = tracks(trace)
-    notice = credit(net)
-    scenario = _scenario(library, trace, whole, notice)
-    try:
-        _write_roads(net, folder, notice)
-        scenario.write_xml(str(folder / XOSC))
-    except OSError as error:
-        raise InputError(f"{str(folder / XOSC)!r}: cannot be written: {error.strerror}") from error
-    return partial
-
-
-def _write_roads(net: Path, folder: Path, notice: str) -> None:
-    """Write the roads; without paths of this machine, and without a date."""
+    scenario = _scenario(xosc, trace, place, way, notice)
+    roads = roads_of(place.net, notice)
     with TemporaryDirectory(prefix="cavsumo-") as work:
-        options = [f"sumo-net-file={net.resolve()}", f"opendrive-output={XODR}"]
-        netconvert(options, Path(work))
-        text = (Path(work) / XODR).read_text(encoding="utf-8")
-    text = re.sub(r'(<header [^>]*\bdate=")[^"]*"', rf'\g<1>{UNDATED:%Y-%m-%dT%H:%M:%S}"', text)
-    made = f"made by netconvert {netconvert_version()} from {in_comment(net.name)}"
-    text = with_notice(text, made, [in_comment(notice)] if notice else [])
-    (folder / XODR).write_text(text, encoding="utf-8")
+        scenario.write_xml(str(Path(work) / XOSC))
+        story = (Path(work) / XOSC).read_text(encoding="utf-8")
+    write_all(folder, {XODR: roads, XOSC: story})
+
+
+def write_all(folder: Path, texts: dict[str, str]) -> None:
+    """Write files into a folder: all of them or none."""
+    made = []
+    try:
+        for name, text in texts.items():
+            made.append((folder / f".{name}.new", folder / name))
+            made[-1][0].write_text(text, encoding="utf-8")
+        for new, file in made:
+            new.replace(file)
+    except OSError as error:
+        for new, _ in made:
+            new.unlink(missing_ok=True)
+        said = f"{str(made[-1][1])!r}: cannot be written: {error.strerror}"
+        raise InputError(said) from error
 
 
 def _library() -> Any:
@@ -83,51 +107,37 @@ def _library() -> Any:
     return xosc
 
 
-def tracks(trace: Trace) -> tuple[dict[str, Track], list[str]]:
-    """The tracks of the reference points of all bodies that are there in every frame; the others.
-
-    Headings go on without jumps.
-    """
-    shapes, found = trace.shapes(), dict[str, list[tuple[float, float, float, float]]]()
-    for frame in trace.frames:
-        for _, name, state in states(frame):
-            x, y, o = reference_point(shapes[name], state)
-            own = found.setdefault(name, [])
-            if own:
-                o = own[-1][3] + math.remainder(o - own[-1][3], math.tau)
-            own.append((frame["time_s"], x, y, o))
-    length = len(trace.frames)
-    whole: dict[str, Track] = {name: way for name, way in found.items() if len(way) == length}
-    return whole, [name for name in found if name not in whole]
-
-
-def reference_point(shape: Shape, state: Sequence[float]) -> tuple[float, float, float]:
-    """The reference point of a body and its heading, from the middle of its box."""
-    x, y, _, o = state
-    back = axle(shape)
-    return x - back * math.cos(o), y - back * math.sin(o), o
-
-
-def axle(shape: Shape) -> float:
-    """How far the rear axle lies behind the middle of a body, within its box [m]."""
-    if shape.kind == PEDESTRIAN.name:
-        return 0.0
-    return min(shape.wheelbase, shape.length) / 2.0
-
-
-def _scenario(xosc: Any, trace: Trace, whole: Mapping[str, Track], notice: str) -> Any:
+def _scenario(xosc: Any, trace: Trace, place: ExportPlace, way: str, notice: str) -> Any:
     """The scenario; ``notice``: the attribution that the map's licence requires."""
-    shapes, entities, init = trace.shapes(), xosc.Entities(), xosc.Init()
-    end = float(trace.frames[-1]["time_s"])
-    act = xosc.Act("recorded", _after(xosc, 0.0))
-    for name, track in whole.items():
-        entities.add_scenario_object(name, _entity(xosc, name, shapes[name]))
-        init.add_init_action(name, xosc.TeleportAction(_place(xosc, track[0])))
-        act.add_maneuver_group(_following(xosc, name, track))
-    board = xosc.StoryBoard(init, _after(xosc, end, "stop"))
+    bodies, end = stays(trace), float(trace.frames[-1]["time_s"])
+    entities, init = xosc.Entities(), xosc.Init()
+    act = xosc.Act(way, at_time(xosc, 0.0, "start"))
+    for body in bodies:
+        entities.add_scenario_object(body.name, entity(xosc, body))
+        for action in _begins(xosc, body, place, way):
+            init.add_init_action(body.name, action)
+        if body.late:
+            init.add_global_action(xosc.DeleteEntityAction(body.name))
+        events = list(_events(xosc, body, bodies[0], way, end))
+        if events:
+            act.add_maneuver_group(group(xosc, body.name, events))
+    last = end if way == RECORDED else max(end, place.horizon)
+    board = xosc.StoryBoard(init, at_time(xosc, last, "stop", after=True, stop=True))
     board.add_act(act)
+    return _document(xosc, trace, way, notice, entities, board)
+
+
+def _document(xosc: Any, trace: Trace, way: str, notice: str, entities: Any, board: Any) -> Any:
+    """The file: its header, and what it consists of."""
+    known = xosc.Properties()
+    speeds = {
+        body.name: [one.speed for track in body.tracks for one in track] for body in stays(trace)
+    }
+    known.add_property(HEAD, json.dumps({**head_of(trace, way), "speeds": speeds}))
+    row = trace.row
+    said = f"run {row['run']}, {row['outcome']}, as {way}"
     return xosc.Scenario(
-        _title(trace.row, notice),
+        f"{said}; {notice}" if notice else said,
         f"cavsumo {__version__}",
         xosc.ParameterDeclarations(),
         entities,
@@ -135,77 +145,90 @@ def _scenario(xosc: Any, trace: Trace, whole: Mapping[str, Track], notice: str) 
         xosc.RoadNetwork(XODR),
         xosc.Catalog(),
         osc_minor_version=MINOR,
+        license=xosc.License("ODbL 1.0", spdxId="ODbL-1.0", resource=None) if notice else None,
         creation_date=UNDATED,
+        header_properties=known,
     )
 
 
-def _title(row: Mapping[str, str], notice: str) -> str:
-    """The description in the file's header."""
-    said = f"run {row['run']}, {row['outcome']}, as recorded"
-    return f"{said}; {notice}" if notice else said
+def _begins(xosc: Any, body: Stays, place: ExportPlace, way: str) -> Iterator[Any]:
+    """The actions with which a body begins."""
+    if body.late:
+        return
+    first = at_axle(body.shape, body.tracks[0][:1])[0]
+    yield xosc.TeleportAction(position(xosc, first))
+    if way == TEST and body.part != "background":
+        yield standing_speed(xosc, first.speed)
+    if way == TEST and body.part == "ego":
+        yield xosc.AssignRouteAction(_route(xosc, place.path))
 
 
-def _entity(xosc: Any, name: str, shape: Shape) -> xosc.Vehicle | xosc.Pedestrian:
-    """The body as an entity."""
-    height = HEIGHT_M.get(shape.kind, CAR_HEIGHT_M)
-    back = axle(shape)
-    box = xosc.BoundingBox(shape.width, shape.length, height, back, 0.0, height / 2)
-    if shape.kind == PEDESTRIAN.name:
-        category = xosc.PedestrianCategory.pedestrian
-        return xosc.Pedestrian(name, PEDESTRIAN_KG, category, box)
-    categories = {BUS.name: "bus", BICYCLE.name: "bicycle"}
-    category = getattr(xosc.VehicleCategory, categories.get(shape.kind, "car"))
-    front = xosc.Axle(0.6, 0.6, shape.width * 0.9, 2.0 * back, 0.3)
-    rear = xosc.Axle(0.0, 0.6, shape.width * 0.9, 0.0, 0.3)
-    return xosc.Vehicle(name, category, box, front, rear, 70.0, 10.0, 10.0)
+def _route(xosc: Any, path: Polyline) -> Any:
+    """The ego's route as waypoints."""
+    route, parts = xosc.Route("route of ego"), max(1, math.ceil(path.length / WAYPOINTS_M))
+    for i in range(parts + 1):
+        x, y, heading = path.at(path.length * i / parts)
+        there = position(xosc, TrackPoint(0.0, x, y, heading, 0.0))
+        route.add_waypoint(there, xosc.RouteStrategy.shortest)
+    return route
 
 
-def _following(xosc: Any, name: str, track: Track) -> Any:
-    """A body that follows its track by the clock."""
-    points = held(track)
-    shape = xosc.Polyline([point[0] for point in points], [_place(xosc, p) for p in points])
-    trajectory = xosc.Trajectory(f"track of {name}", closed=False)
-    trajectory.add_shape(shape)
-    follow = xosc.FollowTrajectoryAction(
-        trajectory, xosc.FollowingMode.position, xosc.ReferenceContext.absolute, 1, 0
-    )
-    event = xosc.Event(f"{name} moves", xosc.Priority.override)
-    event.add_action(f"{name} follows", follow)
-    event.add_trigger(_after(xosc, 0.0, "start", name))
-    manoeuvre = xosc.Maneuver(f"manoeuvre of {name}")
-    manoeuvre.add_event(event)
-    group = xosc.ManeuverGroup(f"group of {name}")
-    group.add_actor(name)
-    group.add_maneuver(manoeuvre)
-    return group
+def _events(xosc: Any, body: Stays, ego: Stays, way: str, end: float) -> Iterator[Any]:
+    """The events of a body."""
+    if way == TEST and body.part == "ego":
+        return
+    if way == TEST and body.part == "tester":
+        yield from _waiting(xosc, body, ego)
+        return
+    yield from _by_clock(xosc, body, ego, way, end)
 
 
-def held(track: Track) -> Track:
-    """A track with points just before and after each, on the way, with the same heading.
-
-    Players turn between the headings of points in different ways; some are halfway at a point.
-    """
-    points = []
-    for i, (time, x, y, heading) in enumerate(track):
-        for shift in (-HELD_S, 0.0, HELD_S):
-            other = track[max(0, min(len(track) - 1, i + (shift > 0.0) - (shift < 0.0)))]
-            share = shift / (other[0] - time) if other[0] != time else 0.0
-            if share or not shift:
-                there = x + share * (other[1] - x), y + share * (other[2] - y)
-                points.append((time + shift, *there, heading))
-    return points
+def _pause(ego: Stays) -> float:
+    """The time between two frames [s]."""
+    track = ego.tracks[0]
+    return track[1].time - track[0].time if len(track) > 1 else 0.0
 
 
-def _place(xosc: Any, point: tuple[float, float, float, float]) -> Any:
-    """A place in the world."""
-    _, x, y, heading = point
-    return xosc.WorldPosition(x, y, 0.0, heading, 0.0, 0.0)
+def _by_clock(xosc: Any, body: Stays, ego: Stays, way: str, end: float) -> Iterator[Any]:
+    """The events of a body that follows its tracks by the clock."""
+    for i, track in enumerate(body.tracks):
+        name = f"{body.name} {i}"
+        there = at_axle(body.shape, track)
+        begin, last = track[0].time, track[-1].time
+        if body.late or i:
+            added = xosc.AddEntityAction(body.name, position(xosc, there[0]))
+            due = begin - HALF * _pause(ego)  # players add a body one of their steps later
+            yield event(xosc, f"{name} enters", added, at_time(xosc, due, f"{name} is due"))
+        action = follow(xosc, f"track of {name}", there, by_clock=True)
+        yield event(xosc, f"{name} moves", action, at_time(xosc, begin, f"{name} starts"))
+        if last < end or way == TEST:
+            gone = xosc.DeleteEntityAction(body.name)
+            trigger = at_time(xosc, last, f"{name} is over", after=True)
+            yield event(xosc, f"{name} leaves", gone, trigger)
 
 
-def _after(xosc: Any, time: float, sort: str = "start", name: str = "") -> Any:
-    """A trigger that holds from a time on [s]."""
-    rule = xosc.Rule.greaterThan if sort == "stop" else xosc.Rule.greaterOrEqual
-    condition = xosc.SimulationTimeCondition(time, rule)
-    return xosc.ValueTrigger(
-        f"{sort} {name}".strip(), 0.0, xosc.ConditionEdge.none, condition, triggeringpoint=sort
-    )
+def _waiting(xosc: Any, body: Stays, ego: Stays) -> Iterator[Any]:
+    """The events of a tester that waits for the ego where it last stood."""
+    track, name = body.tracks[0], body.name
+    at = set_off(track)
+    before = None
+    if at is None or at > 0:
+        first = track if at is None else track[: at + 1]
+        if at is None:
+            first = [*first, _straight_on(first[-1])]
+        if driven(first)[-1] > 0.0:
+            before = f"{name} moves"
+            action = follow(xosc, f"way of {name}", at_axle(body.shape, first), by_clock=True)
+            yield event(xosc, before, action, at_time(xosc, 0.0, f"{name} starts"))
+    if at is not None and at < len(track) - 1:
+        second = at_axle(body.shape, [*track[at:], _straight_on(track[-1])])
+        action = follow(xosc, f"last way of {name}", second, by_clock=False)
+        metres = driven(at_axle(ego.shape, ego.tracks[0]))[at]
+        trigger = ego_has_come(xosc, metres, f"ego has come {metres:.1f} m", before)
+        yield event(xosc, f"{name} sets off", action, trigger)
+
+
+def _straight_on(last: TrackPoint) -> TrackPoint:
+    """Where a body is some time after the end of its track."""
+    ahead = moved([last], last.speed * STRAIGHT_ON_S)[0]
+    return ahead._replace(time=last.time + STRAIGHT_ON_S)

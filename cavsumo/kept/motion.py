@@ -71,6 +71,31 @@ class BodyMotion:
         now = [speed for step, speed in self.legs if step <= steps][-1]
         return replace(self, start=start, legs=(MotionLeg(0, now), *left))
 
+    def shifted(self, steps: int, dt: float) -> BodyMotion | None:
+        """The motion so many timesteps earlier (negative: later), the first leg as long before.
+
+        None for one that is not in legs, where a leg would have to begin before the episode, and
+        where the body would have to start beyond the beginning of its way.
+        """
+        if not self.legs:
+            return None
+        first, *rest = self.legs
+        later = [MotionLeg(step - steps, speed) for step, speed in rest]
+        place = self._place(first.speed * steps * dt)
+        if place is None or any(leg.step <= 0 for leg in later):
+            return None
+        x, y, o = place
+        return replace(self, start=self.start._replace(x=x, y=y, o=o), legs=(first, *later))
+
+    def _place(self, beyond: float) -> tuple[float, float, float] | None:
+        """The place x, y, o so far beyond the start [m] on its way; None beyond its ends."""
+        x, y, o = self.start.x, self.start.y, self.start.o
+        if not self.way:
+            return x + beyond * math.cos(o), y + beyond * math.sin(o), o
+        path = Path(self.way)
+        along = path.project(x, y).along + beyond
+        return path.at(along) if 0.0 <= along <= path.length else None
+
 
 LONGEST = 2000  # timesteps of a motion in legs
 

@@ -18,6 +18,8 @@ from cavsumo.model.departures import Entry, Trip, Walk
 
 SHARES = (7 / 8, 3 / 4, 1 / 2, 1 / 4)  # of the time before the violation that are cut at once
 SECONDS = (4, 2, 1)  # and times [s]
+# How much earlier or later the testers move once others are gone [s].
+SHIFTS_S = tuple(0.1 * n for n in (*range(1, 11), *range(12, 32, 2)))
 PLACES = (0, 1, 2)  # decimals to which places, angles and speeds are rounded
 ANGLES = (45.0, 5.0, 1.0, 0.1)  # degrees of whose multiples headings are made
 
@@ -63,6 +65,7 @@ class Reductions:
             self.background,
             self.motions,
             self.approach,
+            self.retimed,
             self.numbers,
         )
 
@@ -130,6 +133,18 @@ class Reductions:
             if 0 < steps < tracks.end and steps in tracks.entries:
                 yield _later(candidate, steps, tracks, dt)
 
+    def retimed(self, candidate: Candidate) -> Iterator[Candidate]:
+        """Fewer testers, or no background, the testers earlier or later.
+
+        An ego that no longer brakes for somebody comes at another time.
+        """
+        fewer = [one for one in self.testers(candidate) if one.cost < candidate.cost]
+        for smaller in (*fewer, *itertools.islice(self.background(candidate), 1)):
+            for seconds in SHIFTS_S:
+                steps = round(seconds / self.fixed.dt)
+                yield from _shifted(smaller, steps, self.fixed.dt)
+                yield from _shifted(smaller, -steps, self.fixed.dt)
+
     def numbers(self, candidate: Candidate) -> Iterator[Candidate]:
         """Rounder numbers."""
         for place, motion in enumerate(candidate.motions):
@@ -147,6 +162,14 @@ def _with_motion(candidate: Candidate, place: int, motion: BodyMotion) -> Candid
     motions = list(candidate.motions)
     motions[place] = motion
     return replace(candidate, motions=tuple(motions))
+
+
+def _shifted(candidate: Candidate, steps: int, dt: float) -> Iterator[Candidate]:
+    """A candidate whose testers move some timesteps earlier; none where one cannot."""
+    motions = [motion.shifted(steps, dt) for motion in candidate.motions]
+    found = tuple(motion for motion in motions if motion is not None)
+    if len(found) == len(motions):
+        yield replace(candidate, motions=found)
 
 
 def _without_leg(motion: BodyMotion, i: int) -> BodyMotion:

@@ -82,6 +82,19 @@ def chosen_acceleration(v: Array, gap: Array, across: Array, along_mps: Array) -
     return np.clip(np.where(on_road, follow, DESIRED_MPS - v), -BRAKE_MPS2, ACCEL_MPS2)
 
 
+def pushed(place: Array, velocity: Array, push: Array) -> tuple[Array, Array]:
+    """The pedestrian a timestep later, with an acceleration; all (..., 2)."""
+    place = place + DT_S * (velocity + 0.5 * DT_S * push)
+    return place, np.clip(velocity + DT_S * push, -FASTEST_MPS, FASTEST_MPS)
+
+
+def struck(place: Array, x: Array, v: Array) -> Array:
+    """Whether a car at x with a speed fails at a pedestrian's place (..., 2)."""
+    near = (np.abs(place[..., 0] - x) <= ZONE_M[0]) & (np.abs(place[..., 1]) <= ZONE_M[1])
+    found: Array = near & (v > MOVING_MPS)
+    return found
+
+
 def walked(start: CrosswalkStart, pushes: Array) -> Array:
     """The pedestrian's places at all timesteps, (..., STEPS + 1, 2) [m].
 
@@ -91,9 +104,7 @@ def walked(start: CrosswalkStart, pushes: Array) -> Array:
     velocity = np.broadcast_to([0.0, start.walk_mps], place.shape).astype(float)
     places = [place]
     for k in range(pushes.shape[-2]):
-        push = pushes[..., k, :]
-        place = place + DT_S * (velocity + 0.5 * DT_S * push)
-        velocity = np.clip(velocity + DT_S * push, -FASTEST_MPS, FASTEST_MPS)
+        place, velocity = pushed(place, velocity, pushes[..., k, :])
         places.append(place)
     return np.stack(places, axis=-2)
 
@@ -111,8 +122,7 @@ def failures(start: CrosswalkStart, numbers: Array) -> Array:
     for k in range(STEPS):
         x, v = x + DT_S * v, v + DT_S * chosen
         here = places[:, k + 1]
-        near = (np.abs(here[:, 0] - x) <= ZONE_M[0]) & (np.abs(here[:, 1]) <= ZONE_M[1])
-        failed |= near & (v > MOVING_MPS)
+        failed |= struck(here, x, v)
         place, velocity = filtered(place, velocity, here + errors[:, k])
         chosen = chosen_acceleration(v, place[:, 0] - x, place[:, 1], velocity[:, 0])
     return failed

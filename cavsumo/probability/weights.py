@@ -100,5 +100,11 @@ def gain_of(terms: Floats, share: float) -> tuple[float, float, float]:
     means, spread = drawn.mean(1), drawn.var(1)
     kept = spread > 0.0
     gains = share * means[kept] * (1.0 - means[kept]) / spread[kept]
-    low, high = (float(one) for one in np.quantile(gains, [0.025, 0.975]))
+    low, high = quantiles(gains)
     return share * mean * (1.0 - mean) / variance, low, high
+
+
+def quantiles(resampled: Floats) -> tuple[float, float]:
+    """The interval of 95 % that resamples give."""
+    low, high = (float(one) for one in np.quantile(resampled, [0.025, 0.975]))
+    return low, high

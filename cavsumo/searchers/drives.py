@@ -69,6 +69,12 @@ class Drives:
     }
     manner: ClassVar[tuple[str, ...]] = ("place", "speed", "depth")
 
+    @property
+    def scales(self) -> Mapping[str, tuple[float, float]]:
+        """The bounds of the numbers that mean the same on every approach."""
+        speeds = SLOWEST_MPS, self.kind.v_max
+        return {"speed": speeds, "effort": (0.0, 1.0), "speed_2": speeds}
+
     def suited(self, shares: Mapping[str, float]) -> tuple[Place, ...]:
         """The places from which the programme of the numbers can be in time; all if none can.
 

@@ -10,6 +10,7 @@ import numpy as np
 from cavsumo.agents.names import SEARCH_METHODS
 from cavsumo.errors import InputError
 from cavsumo.model.bodies import WALKING
+from cavsumo.searchers.bounds import MEETS, SIDE, bounds_numbers
 from cavsumo.searchers.decision_space import DecisionSpace
 from cavsumo.searchers.diversity import DiversitySearch, check_installed
 from cavsumo.searchers.evolution import EvolutionSearch
@@ -21,9 +22,9 @@ from cavsumo.searchers.protocol import RandomSearch, Searcher
 from cavsumo.searchers.space import Space
 from cavsumo.searchers.tree import TreeSearch
 
-BY_DECISIONS = ("tree", "explore")
+BY_DECISIONS, DIVERSITY = ("tree", "explore"), "diversity"
 # Packages that choose points, besides numpy.
-PACKAGES = {"portfolio": ("cma",), "cma": ("cma",), "diversity": ("cma", "ribs")}
+PACKAGES = {"portfolio": ("cma",), "cma": ("cma",), DIVERSITY: ("cma", "ribs")}
 
 
 def _neighbours(space: Space, rng: np.random.Generator) -> Searcher:
@@ -42,7 +43,7 @@ SEARCHERS: Mapping[str, Callable[[Space, np.random.Generator], Searcher]] = {
     "manoeuvres": ManoeuvreSearch,
     "neighbours": _neighbours,
     "cma": EvolutionSearch,
-    "diversity": _diversity,
+    DIVERSITY: _diversity,
     "tree": lambda space, rng: TreeSearch(DecisionSpace(space), rng),
     "explore": lambda space, rng: ExploreSearch(DecisionSpace(space), rng),
 }
@@ -65,8 +66,13 @@ def packages_of(methods: Iterable[str]) -> list[str]:
 
 def check_method(method: str, space: Space) -> None:
     """Raise InputError where a method cannot search a space."""
-    if method == "diversity":
+    if method == DIVERSITY:
         check_installed()
+    if method in BY_DECISIONS and bounds_numbers(space):
+        raise InputError(
+            f"search.method {method}: decides anew every second, so of search.within it can keep "
+            f"{SIDE} and {MEETS} alone; choose another method"
+        )
     if method in BY_DECISIONS and space.movements.kind.name not in WALKING:
         raise InputError(
             f"search.method {method}: decides for {' and '.join(WALKING)}s alone; choose another "

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from cavsumo.model.bodies import WALKING
+from cavsumo.searchers.bounds import bounds_numbers
 from cavsumo.searchers.decision_space import DecisionSpace
 from cavsumo.searchers.evolution import EvolutionSearch
 from cavsumo.searchers.explore import ExploreSearch
@@ -38,7 +39,7 @@ class Portfolio:
             "cma": EvolutionSearch(space, next(streams)),
             "random": RandomSearch(space, next(streams)),
         }
-        if space.movements.kind.name in WALKING:
+        if space.movements.kind.name in WALKING and not bounds_numbers(space):
             decisions = DecisionSpace(space)
             self.members["tree"] = TreeSearch(decisions, next(streams))
             self.members["explore"] = ExploreSearch(decisions, next(streams))

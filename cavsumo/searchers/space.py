@@ -59,6 +59,8 @@ class Movements(Protocol):
         meanings: of the numbers of one body, by their names; "place", "zone" and "speed" are
             among them.
         manner: names of those whose thirds tell manners of moving apart.
+        scales: for those that can be bounded, the numbers at the shares 0 and 1, in SI units and
+            degrees.
     """
 
     @property
@@ -75,6 +77,9 @@ class Movements(Protocol):
 
     @property
     def manner(self) -> tuple[str, ...]: ...
+
+    @property
+    def scales(self) -> Mapping[str, tuple[float, float]]: ...
 
     def suited(self, shares: Mapping[str, float]) -> tuple[Place, ...]:
         """The places that suit the other numbers of a body, in their order; there is always one."""

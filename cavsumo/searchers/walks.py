@@ -54,6 +54,21 @@ class Walks:
     }
     manner: ClassVar[tuple[str, ...]] = ("speed", "heading", "depth")
 
+    @property
+    def scales(self) -> Mapping[str, tuple[float, float]]:
+        """The bounds of the numbers that are even, angles in degrees."""
+        speeds, oblique = (SLOWEST_MPS, self.kind.v_max), math.degrees(OBLIQUE_RAD)
+        return {
+            "zone": ZONES,
+            "speed": speeds,
+            "heading": (-oblique, oblique),
+            "depth": DEPTHS_M,
+            "speed_2": speeds,
+            "heading_2": (-180.0, 180.0),
+            "length_2": (0.0, LONGEST_M),
+            "heading_3": (-180.0, 180.0),
+        }
+
     def suited(self, shares: Mapping[str, float]) -> tuple[Place, ...]:
         """The places from which the programme of the numbers can be in time; all if none can.
 

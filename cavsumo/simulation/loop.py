@@ -110,7 +110,7 @@ class EpisodeLoop:
         if self._learners:
             _feed_back(agents, views, actions, rewards, self.agent_views)
         self.snapshot = successor
-        ended = over(setup, successor)
+        ended = over(setup, successor) or any(agent.stops() for agent in agents)
         self._cut = not (ended or episode.drives) and all_behind(
             setup, agents, self._behind, successor
         )

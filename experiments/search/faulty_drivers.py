@@ -226,5 +226,8 @@ FAULTS = {
     "Creeps": Ability(creeps_mps=1.5),
 }
 
+CAREFUL = "Careful"
+TESTERS = {name: ability.testers for name, ability in FAULTS.items()}
+
 for _name, _ability in FAULTS.items():
     globals()[_name] = type(_name, (Driver,), {"ability": _ability, "__module__": __name__})

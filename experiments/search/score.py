@@ -3,15 +3,17 @@
     python experiments/search/score.py --method portfolio --method timing --seed 1 2 -o some.jsonl
     python experiments/search/score.py --read some.jsonl more.jsonl
 
-Every driver of ``faulty_drivers.py`` is tested on its own, without traffic, by so many episodes; a
-search begins anew for each. A driver whose fault needs two pedestrians meets two, whoever tests it.
-The careful driver must not be failed by anybody. Trials are kept one a line, so a table can be made
-in parts; trials that are in the file already are not played again.
+Every driver of ``faulty_drivers.py`` (or, with ``--drivers other_drivers``, of that module) is
+tested on its own, without traffic, by so many episodes; a search begins anew for each. A driver
+whose fault needs two pedestrians meets two, whoever tests it. A careful driver must not be failed
+by anybody. Trials are kept one a line, so a table can be made in parts; trials that are in the file
+already are not played again.
 """
 
 from __future__ import annotations
 
 import argparse
+import importlib
 import json
 import os
 import resource
@@ -23,7 +25,7 @@ from typing import NamedTuple
 
 HERE = Path(__file__).parent
 AGENTS = ("timing", "proximity", "programmed-random", "random", "best-response")
-CAREFUL = "Careful"
+CAREFUL = ("Careful", "Cautious")  # of the two modules
 
 
 class Trial(NamedTuple):
@@ -65,7 +67,7 @@ def tried(driver: str, method: str, seed: int, testers: int, options: argparse.N
     results = cavsumo.run(
         options.net,
         routes="none",
-        ego=f"faulty_drivers:{driver}",
+        ego=f"{options.drivers}:{driver}",
         agents=[agent],
         params={} if method in AGENTS else {"search.method": method},
         testers=testers,
@@ -121,13 +123,15 @@ def _summed(method: str, trials: Sequence[Trial]) -> str:
     """What a method reached, as a line."""
     from cavsumo.results.statistics import rate
 
-    faulty = [t for t in trials if t.driver != CAREFUL]
-    careful = sum(t.failures for t in trials if t.driver == CAREFUL)
+    faulty = [t for t in trials if t.driver not in CAREFUL]
+    careful = sum(t.failures for t in trials if t.driver in CAREFUL)
     found = rate(sum(t.first is not None for t in faulty), len(faulty))
     episodes = sum(t.episodes for t in faulty)
     wasted = sum(t.unfair + t.invalid for t in faulty) / max(1, episodes)
     seconds, cpu = (sum(getattr(t, what) for t in faulty) for what in ("seconds", "cpu"))
     failures = sum(t.failures for t in faulty)
+    if not faulty:
+        return f"{method}: the careful driver failed {careful} times"
     return (
         f"{method}: a faulty driver failed in {found.count} of {found.total} trials, "
         f"{found.value:.0%} [{found.low:.0%}, {found.high:.0%}], the careful one {careful} times; "
@@ -152,12 +156,11 @@ def play(options: argparse.Namespace) -> list[Trial]:
     """Play what is asked for and not yet in the output file, to which it is added."""
     sys.path.insert(0, str(HERE))
     os.environ["PYTHONPATH"] = os.pathsep.join([str(HERE), os.environ.get("PYTHONPATH", "")])
-    from faulty_drivers import FAULTS, Ability
-
+    there = importlib.import_module(options.drivers)
     known = {t.key: t for t in read([options.output] if options.output else [])}
     trials = []
-    for driver in options.driver or [CAREFUL, *FAULTS]:
-        testers = max(options.testers, FAULTS.get(driver, Ability()).testers)
+    for driver in options.driver or [there.CAREFUL, *there.TESTERS]:
+        testers = max(options.testers, there.TESTERS.get(driver, 1))
         for method in options.method or ["portfolio", "timing"]:
             for seed in options.seed:
                 key = driver, method, seed, options.net, testers, options.episodes
@@ -175,6 +178,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--method", action="append", default=[], help="of the search, or an agent")
     parser.add_argument("--driver", action="append", default=[], help="by default all")
+    parser.add_argument("--drivers", default="faulty_drivers", help="the module of the drivers")
     parser.add_argument("--net", default="crossing")
     parser.add_argument("--testers", type=int, default=1, help="at least so many")
     parser.add_argument("--episodes", type=int, default=150)

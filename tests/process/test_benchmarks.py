@@ -122,6 +122,17 @@ def test_estimates(play: Play) -> None:
     assert [row.split()[0] for row in methods] == ["auto", "monte-carlo"]
 
 
+def test_drivers_under_an_exposure(play: Play, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Two drivers, ten episodes each."""
+    monkeypatch.syspath_prepend(str(ROOT / "experiments" / "search"))
+    monkeypatch.setenv("PYTHONPATH", str(ROOT / "experiments" / "search"))
+    words = "--net", "pedestrians", "--ego", "constant", "--ego", "faulty_drivers:Careful"
+    _, _, *rows = play("exposed_drivers", *words, "--max-episodes", "10").splitlines()
+    assert [row.split(" | ")[0] for row in rows] == ["| constant", "| Careful"]
+    assert all(row.split(" | ")[2] == "10" for row in rows)
+    assert rows[1].split(" | ")[3] == "0"
+
+
 def test_reference_tracks(play: Play) -> None:
     """One cell: the largest differences are within the tolerances."""
     test, everything = play("reference_tracks", "--only", "CPFA/60/50").splitlines()[1:]
@@ -154,6 +165,15 @@ def test_ast_crosswalk(play: Play) -> None:
     lines = play("ast_crosswalk", "--episodes", "50", "--sumo", "1").splitlines()[1:]
     assert [line.split()[0] for line in lines] == ["start-1", "start-2", "start-3"]
     assert all("of 50" in line and line.endswith("alike 1") for line in lines)
+
+
+def test_crosswalks(play: Play) -> None:
+    """One estimate by each method on a starting point, with a truth that is given."""
+    words = "start-2", "--counted", "107", "10000", "--runs", "200", "--replications", "2"
+    truth, _, *found = play("crosswalks", *words).splitlines()
+    assert truth.startswith("start-2: 107 failures in 10000 episodes: 0.0107 [")
+    assert [row.split()[0] for row in found] == ["shifts", "splitting"]
+    assert all(numbers(row)[5] > 1000 for row in found)
 
 
 def test_street_suites(play: Play) -> None:
@@ -515,14 +535,22 @@ def test_the_tables_of_the_experiments(
     assert (tmp_path / "agency.csv").is_file() == (name == "tables")
 
 
+@pytest.mark.parametrize(
+    ("drivers", "driver"),
+    [("faulty_drivers", "SeesTheNearestOnly"), ("other_drivers", "YieldsToOne")],
+)
 def test_scores_against_faulty_drivers(
-    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], tmp_path: Path
+    drivers: str,
+    driver: str,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+    tmp_path: Path,
 ) -> None:
     """One driver, ten episodes of a search and of timing; the table once more from the file."""
     monkeypatch.syspath_prepend(str(ROOT / "experiments" / "search"))
     monkeypatch.setenv("PYTHONPATH", "")
     file = str(tmp_path / "trials.jsonl")
-    words = ["--driver", "SeesTheNearestOnly", "--seed", "1", "--episodes", "10", "-j", "1"]
+    words = ["--drivers", drivers, "--driver", driver, "--seed", "1", "--episodes", "10", "-j", "1"]
     monkeypatch.setattr(sys, "argv", ["score.py", *words, "--net", "pedestrians", "-o", file])
     script("search/score").main()
     table = capsys.readouterr().out
@@ -531,7 +559,7 @@ def test_scores_against_faulty_drivers(
     assert last.startswith("timing: a faulty driver failed in ")
     assert " of 1 trials" in last
     trials = [json.loads(line) for line in Path(file).read_text(encoding="utf-8").splitlines()]
-    assert [(t["driver"], t["testers"]) for t in trials] == [("SeesTheNearestOnly", 2)] * 2
+    assert [(t["driver"], t["testers"]) for t in trials] == [(driver, 2)] * 2
     monkeypatch.setattr(sys, "argv", ["score.py", "--read", file])
     script("search/score").main()
     assert capsys.readouterr().out == table

@@ -9,7 +9,7 @@ from pathlib import Path
 from inline import cavsumo
 from support import STRAIGHT_NET
 
-from cavsumo.agents.planning.response import Counts
+from cavsumo.agents.planning.opponent import Counts
 
 
 def test_it_learns_and_what_it_learned_is_played_frozen(tmp_path: Path) -> None:

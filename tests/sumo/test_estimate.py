@@ -117,6 +117,35 @@ def test_two_egos_meet_the_same_encounters(folder: Path, capsys: Capture) -> Non
     assert "too few for a ratio" in said["comparison"]["refused"]
 
 
+def test_the_output_may_be_redirected_into_a_default_name(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The results then lie beside it; without redirection they have the default name."""
+    monkeypatch.chdir(tmp_path)
+    words = ["estimate", "--net", "pedestrians", "--ego", "constant", "--trace", "none", "-q"]
+    words += ["--max-episodes", "2", "--json"]
+    for name, file in (("results.json", "estimate.csv"), ("estimate.json", "results.csv")):
+        with Path(name).open("w", encoding="utf-8") as stream, monkeypatch.context() as patch:
+            patch.setattr("sys.stdout", stream)
+            assert main(words) == Exit.OK
+        said = json.loads(Path(name).read_text(encoding="utf-8"))
+        assert (said["results"], said["episodes"]) == (file, 2)
+        assert len(rows(tmp_path / file)) == 2
+        for there in tmp_path.glob("*.*"):
+            there.unlink()
+
+
+def test_results_do_not_replace_the_redirected_output(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: Capture
+) -> None:
+    """A results file that was named: the sentence says what collides."""
+    with (tmp_path / "a.json").open("w", encoding="utf-8") as stream:
+        monkeypatch.setattr("sys.stdout", stream)
+        assert _estimate(tmp_path / "a.csv", "--overwrite", most=2) == Exit.USAGE
+    assert "this command is redirected into" in capsys.readouterr().err
+    assert [file.name for file in tmp_path.iterdir()] == ["a.json"]
+
+
 def test_beside_other_agents_all_play_equally_often(tmp_path: Path) -> None:
     """An exposure in a batch of two agents goes on after its estimate is over."""
     words = ["run", "--net", "pedestrians", "--ego", "constant", "--testers", "1", "--runs", "25"]

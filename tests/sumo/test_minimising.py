@@ -129,6 +129,16 @@ def test_planted_bodies_go(found_failure: Path) -> None:
     assert not small.last.background
 
 
+def test_a_vehicle_for_which_the_ego_braked_goes(tmp_path: Path) -> None:
+    """Without it the ego comes earlier, and so does the other tester."""
+    words = ["run", "--net", "crossing", "--kind", "car", "--agent", "timing"]
+    done = command(tmp_path, *words, "--runs", "8", "-o", "cars.csv", "-q", "--exit-zero")
+    assert done.returncode == 0, done.stderr
+    small = minimised(failure(tmp_path / "cars.csv"), located)
+    assert len(small.first.motions) == 3
+    assert (len(small.last.motions), small.last.background) == (1, ())
+
+
 def test_what_cannot_be_made_smaller_is_refused(
     found_failure: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -171,6 +171,10 @@ def test_a_search_begins_with_what_an_earlier_one_found(
     [
         (["--testers", "2"], "is of another space: testers was 1, is 2"),
         (["--ego", "sumo"], "or how often the ego decides was another one"),
+        (
+            ["--param", "search.within=side=left"],
+            "is of another space: search.within was '', is 'side=left'",
+        ),
     ],
 )
 def test_an_earlier_search_of_another_space_is_refused(
@@ -211,6 +215,7 @@ def test_the_packages_that_chose_the_points_are_recorded(
         (["--method", "explor"], "unknown method 'explor'; did you mean 'explore'?"),
         (["--param", "search.method=tre"], "unknown method 'tre'; did you mean 'tree'?"),
         (["--kind", "car", "--method", "tree"], "search.method tree: decides for pedestrian"),
+        (["--param", "search.within=speed=1.2:0.4"], "is the wrong way round; write speed=0.4:1.2"),
         (["--shard", "1/2"], "shard 1/2: search"),
     ],
 )
@@ -234,10 +239,25 @@ def test_the_space_is_derived_once(tmp_path: Path, monkeypatch: pytest.MonkeyPat
     assert len(derived) == 1
 
 
-def test_another_space_is_not_continued(found: Path, capsys: Capture) -> None:
-    """Two testers have other points than one."""
-    assert _search(found, "--resume", "--testers", "2") == Exit.USAGE
-    assert "testers" in capsys.readouterr().err
+@pytest.mark.parametrize("other", [("--testers", "2"), ("--param", "search.within=side=left")])
+def test_another_space_is_not_continued(
+    other: tuple[str, str], found: Path, capsys: Capture
+) -> None:
+    """Two testers have other points than one, and bounds make others of them."""
+    assert _search(found, "--resume", *other) == Exit.USAGE
+    key, *_ = other[1].split("=") if "=" in other[1] else ("testers",)
+    assert key in capsys.readouterr().err
+
+
+def test_a_bounded_search_is_continued(tmp_path: Path) -> None:
+    """All bodies come from one side, slowly; the same rows after an interruption."""
+    bounds = "--param", "search.within=side=left speed=0.3:0.6", "--exit-zero"
+    whole, half = (_folder(tmp_path / name) for name in ("whole", "half"))
+    assert _search(whole, *bounds) == 0
+    _halves(whole, half, *bounds)
+    met = [row for row in rows(whole) if row["from_side"]]
+    assert {row["from_side"] for row in met} <= {"left"}
+    assert met
 
 
 def test_a_route_that_nobody_can_meet_is_refused(

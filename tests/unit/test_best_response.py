@@ -14,24 +14,26 @@ import pytest
 
 from cavsumo.agents import AGENTS
 from cavsumo.agents.best_response import LONGEST_NOTICE_S, notice_of
-from cavsumo.agents.planning import response, solving
+from cavsumo.agents.planning import grid, moves, response, solving
 from cavsumo.agents.planning.coordinates import Coordinates
-from cavsumo.agents.planning.opponent import KEEPS, OLDEST, AccelerationReader, Counts, situation
-from cavsumo.agents.planning.response import (
-    HUMAN_DECEL,
-    HUMAN_REACTION_S,
+from cavsumo.agents.planning.grid import (
     SPEEDS,
-    STAND,
-    WALK,
     ZETAS,
-    Aim,
     States,
     braking,
     corners,
     grid_for,
-    move,
     scale,
 )
+from cavsumo.agents.planning.moves import (
+    HUMAN_DECEL,
+    HUMAN_REACTION_S,
+    STAND,
+    WALK,
+    Aim,
+    move,
+)
+from cavsumo.agents.planning.opponent import KEEPS, OLDEST, AccelerationReader, Counts, situation
 from cavsumo.agents.planning.solving import best_response, chain, layer, roll_out, unsolved
 from cavsumo.egos.reference.encounter import EVALUATION_S
 from cavsumo.egos.reference.human import DELAY_S, FULL_MPS2, RISE_S
@@ -44,10 +46,11 @@ DT = 0.1
 @pytest.fixture
 def small(monkeypatch: pytest.MonkeyPatch) -> None:
     """A coarse grid, which is solved in a moment."""
-    monkeypatch.setattr(response, "BEFORE_S", 1.0)
+    monkeypatch.setattr(grid, "BEFORE_S", 1.0)
     monkeypatch.setattr(solving, "ROLLOUTS", 10)
-    for module in (response, solving):
+    for module in (grid, moves, solving):
         monkeypatch.setattr(module, "ZETAS", ZETAS[::3])
+    for module in (grid, solving):
         monkeypatch.setattr(module, "SPEEDS", SPEEDS[::2])
 
 

@@ -78,6 +78,32 @@ def test_a_motion_that_begins_later_goes_on_the_same(steps: int) -> None:
             assert pose == pytest.approx(was_then)
 
 
+@pytest.mark.parametrize("steps", [-7, 4])
+@pytest.mark.parametrize("first", [0.0, 1.4])
+@pytest.mark.parametrize("way", [(), ((-20.0, 0.0), (20.0, 0.0))])
+def test_a_motion_at_another_time_is_the_same(
+    way: tuple[tuple[float, float], ...], first: float, steps: int
+) -> None:
+    """It comes to every place so many timesteps earlier, or later."""
+    legs = (MotionLeg(0, first), MotionLeg(10, 0.7))
+    was = BodyMotion(StartRecord(0.0, 0.0, 0.0, first), legs, way)
+    shifted = was.shifted(steps, DT)
+    assert shifted is not None
+    poses, again = track(was, PEDESTRIAN, 40), track(shifted, PEDESTRIAN, 40)
+    for step, pose in enumerate(poses):
+        if 0 <= step - steps <= 40:
+            assert again[step - steps] == pytest.approx(pose, abs=1e-9), step
+
+
+def test_a_motion_without_room_is_not_shifted() -> None:
+    """In time before its second leg, along its way before its beginning; nor one as recorded."""
+    start, way = StartRecord(0.0, 0.0, 0.0, 1.4), ((-1.0, 0.0), (20.0, 0.0))
+    standing = BodyMotion(start._replace(v=0.0), (MotionLeg(0, 0.0), MotionLeg(10, 0.7)))
+    assert standing.shifted(10, DT) is None
+    assert BodyMotion(start, (MotionLeg(0, 1.4),), way).shifted(-8, DT) is None
+    assert dawdling(PEDESTRIAN).shifted(1, DT) is None
+
+
 def test_segments_of_what_was_recorded() -> None:
     """Parts with one action each."""
     assert dawdling(PEDESTRIAN).segments == 5

@@ -25,6 +25,7 @@ ROOMS = {
         "network": "model",
         "agents": "model games",
         "assertions": "model network agents",
+        "openscenario": "model network agents",
         "egos": "model agents assertions",
         "sumo": "model network egos",
         "simulation": "model network agents assertions egos sumo",
@@ -36,11 +37,11 @@ ROOMS = {
         "kept": "model network agents assertions results batch",
         "report": "model suites network assertions egos results probability batch kept",
         "interop": "model network sumo results",
-        "api": "model suites network agents batch kept report results",
+        "api": "model suites network agents openscenario batch kept report results",
         "envs": "model network agents assertions egos simulation results batch",
         "testing": "model network agents assertions egos",
-        "cli": "model games suites network agents assertions egos results batch kept report "
-        "interop testing",
+        "cli": "model games suites network agents openscenario assertions egos results batch kept "
+        "report interop testing",
     }.items()
 }
 ROOT = {"__init__", "__main__", "errors"}

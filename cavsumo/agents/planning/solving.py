@@ -6,29 +6,33 @@ from typing import Any
 
 import numpy as np
 
-from cavsumo.agents.planning.opponent import Counts
-from cavsumo.agents.planning.response import (
+from cavsumo.agents.planning.grid import (
     CLASSES,
-    NEGLIGIBLE,
-    PRECISION,
     SPEEDS,
-    STAND,
-    WALK,
     ZETAS,
-    Aim,
-    Counted,
     Floats,
     Grid,
     Ints,
-    Plan,
     States,
     braking,
     corners,
+    grid_for,
+    scale,
+)
+from cavsumo.agents.planning.moves import (
+    STAND,
+    WALK,
+    Aim,
+    move,
+)
+from cavsumo.agents.planning.opponent import Counts
+from cavsumo.agents.planning.response import (
+    NEGLIGIBLE,
+    PRECISION,
+    Counted,
+    Plan,
     counted,
     deciding,
-    grid_for,
-    move,
-    scale,
 )
 from cavsumo.games import Game, from_arrays, solve
 

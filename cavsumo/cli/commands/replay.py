@@ -82,7 +82,7 @@ def _found(file: Path, wanted: ReplayOptions) -> Record:
     if is_cavtest(file):
         return read_cavtest(file, allowed).record
     if is_trace(file):
-        return recorded_alone(file, allowed, anew=not wanted.playback)
+        return recorded_alone(file, allowed, anew=not (wanted.playback or wanted.shown))
     assert wanted.run is not None
     return recorded(file, wanted.run, allowed)
 

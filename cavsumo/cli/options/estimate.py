@@ -19,6 +19,7 @@ if TYPE_CHECKING:
 DEFAULTS = {"agents": [EXPOSURE], "testers": 1, "runs": 2000}
 PLAIN = "monte-carlo"
 ALL = 1e-6  # a half-width that no episodes reach
+OTHERWISE = ("estimate.csv", "episodes.csv")  # where the output itself goes into SCRATCH
 PICTURES = (".svg", ".png")
 
 
@@ -58,6 +59,7 @@ def _fill(estimate: argparse.ArgumentParser) -> None:
 def _estimate(options: argparse.Namespace) -> int:
     from cavsumo.batch.manner import Manner, Means
     from cavsumo.batch.planned import planned
+    from cavsumo.cli.options.redirected import free_output
     from cavsumo.cli.scenario_settings import parts_of
 
     shown = _shown(options)
@@ -66,7 +68,8 @@ def _estimate(options: argparse.Namespace) -> int:
         parts = _against(parts, options)
     manner = Manner(**values_of(options, Manner), scratch=options.output is None)
     means = Means(options.jobs, options.executor, options.scheduler)
-    batches = planned(parts, Path(options.output or SCRATCH), manner)
+    output = free_output(options.output, (SCRATCH, *OTHERWISE), parts)
+    batches = planned(parts, output, manner)
     from cavsumo.cli.commands.estimate import estimate
 
     return estimate(batches, means, manner, shown)

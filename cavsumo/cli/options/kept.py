@@ -63,7 +63,17 @@ def add_export(commands: Any) -> None:
         allow_abbrev=False,
     )
     _add_episode(export)
-    export.add_argument("--to", required=True, choices=("openscenario",), help="the format")
+    export.add_argument(
+        "--to", required=True, choices=("openscenario", "commonroad"), help="the format"
+    )
+    export.add_argument(
+        "--as",
+        dest="way",
+        choices=("recorded", "test"),
+        default="recorded",
+        help="recorded: all follow their recorded tracks (default); test: the ego is left to the "
+        "player's controller, testers wait for it and then follow theirs",
+    )
     export.add_argument(
         "-o", "--output", type=Path, required=True, metavar="FOLDER", help="a folder for the files"
     )

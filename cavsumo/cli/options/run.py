@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import sys
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -25,12 +26,39 @@ def add_run(commands: Any) -> None:
         "default; a TOML file given with -c may hold the same keys, the command line wins.",
         allow_abbrev=False,
     )
-    run.fill = fill
+    run.fill = _fill
     run.set_defaults(command=_run)
 
 
+def _fill(run: argparse.ArgumentParser) -> None:
+    """Add the options: of all settings, and of published scenarios."""
+    fill(run)
+    group = run.add_argument_group("published scenario")
+    group.add_argument(
+        "--scenario",
+        metavar="FILE",
+        help="OpenSCENARIO XML (.xosc): a scenario, or variations of one with a batch for each",
+    )
+    group.add_argument(
+        "--scenario-param",
+        action="append",
+        metavar="NAME=VALUE",
+        help="a value of a parameter of the scenario; repeat for several",
+    )
+    group.add_argument(
+        "--scenario-root",
+        metavar="FOLDER",
+        help="folder that the files of the scenario may come from (default: its own)",
+    )
+    group.add_argument(
+        "--scenario-ego",
+        metavar="ENTITY",
+        help="the entity under test (default Ego)",
+    )
+
+
 def fill(run: argparse.ArgumentParser) -> None:
-    """Add the options, a group for each heading of the settings."""
+    """Add the options of a batch, a group for each heading of the settings."""
     from cavsumo.cli.setting_options import add_setting
     from cavsumo.model.scenario.fields import settings
 
@@ -84,19 +112,32 @@ OTHERS: Mapping[str, Callable[[Callable[..., Any]], None]] = {
 
 
 def _run(options: argparse.Namespace) -> int:
-    from cavsumo.cli.scenario_settings import parts_of
+    from cavsumo.cli.scenario_settings import parts_of, published
 
-    return played(parts_of(options), options)
+    found = published(options)
+    if found is None:
+        return played(parts_of(options), options)
+    if not options.quiet:
+        for note in found.notes:
+            print(f"cavsumo: {options.scenario}: {note}", file=sys.stderr)
+    return played(found.parts, options, found.places)
 
 
-def played(parts: Sequence[Part], options: argparse.Namespace) -> int:
-    """Play the batches of a run as its options say."""
+def played(
+    parts: Sequence[Part],
+    options: argparse.Namespace,
+    places: Mapping[str, Path] | None = None,
+) -> int:
+    """Play the batches of a run as its options say.
+
+    ``places``: the present paths of files that the parts name.
+    """
     from cavsumo.batch.manner import Manner, Means
     from cavsumo.batch.planned import planned
 
     manner = Manner(**values_of(options, Manner), scratch=options.output is None)
     means = Means(options.jobs, options.executor, options.scheduler)
-    batches = planned(parts, Path(options.output or SCRATCH), manner)
+    batches = planned(parts, Path(options.output or SCRATCH), manner, places)
     # What can be refused quickly has been; now comes what takes long to import.
     from cavsumo.cli.commands.run import run_study
 

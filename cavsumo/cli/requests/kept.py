@@ -27,6 +27,7 @@ class KeepOptions:
         html: a page to write.
         replays: the most that are played.
         quiet: no progress.
+        to, way: the format of an export, and whether as recorded or as a test.
     """
 
     results: Path
@@ -38,6 +39,8 @@ class KeepOptions:
     html: Path | None = None
     replays: int = 1000
     quiet: bool = False
+    to: str = "openscenario"
+    way: str = "recorded"
 
 
 def check_kept(command: str, wanted: KeepOptions) -> None:
@@ -59,7 +62,7 @@ def check_export(wanted: KeepOptions) -> None:
     """Refuse wrong names and files."""
     if wanted.output is None or not wanted.output.is_dir():
         raise InputError(f"--output {str(wanted.output)!r}: no such folder")
-    if find_spec("scenariogeneration") is None:
+    if wanted.to == "openscenario" and find_spec("scenariogeneration") is None:
         raise InputError("export: needs scenariogeneration: pip install 'cavsumo[export]'")
     _check_episode("export", wanted.results, wanted.run)
 

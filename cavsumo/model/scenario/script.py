@@ -29,6 +29,7 @@ from cavsumo.model.curve import Bend, PlaneCurve, Pose
 from cavsumo.model.motion import Motion, Phase, motion_of, to_speed_by, to_speed_over
 from cavsumo.model.scenario.impact import Front, Straight, impact
 from cavsumo.model.scenario.sensor import Finite
+from cavsumo.model.scenario.storyboard import EGO, Storyboard
 from cavsumo.model.scenario.track import Place, ScriptedTrack
 
 Length = Annotated[float, Field(gt=0, le=50, allow_inf_nan=False)]
@@ -142,6 +143,7 @@ class Programme(ScriptPart):
     begins: Begins | None = Field(None, description="when its stages begin; None for never")
     stages: tuple[SpeedChange, ...] = ()
     track: ScriptedTrack | None = Field(None, description="its places, in place of all that")
+    top_mps: Speed | None = Field(None, description="its largest speed on a storyboard [m/s]")
     errors_m: tuple[Place, ...] = Field(
         (), description="of its place as the ego measures it, in each timestep from the first [m]"
     )
@@ -173,6 +175,8 @@ class Programme(ScriptPart):
     @property
     def top_speed(self) -> float:
         """Its largest speed [m/s]."""
+        if self.top_mps is not None:
+            return self.top_mps
         return self.motion.top_speed if self.track is None else max(self.track.speeds)
 
     @property
@@ -220,13 +224,15 @@ class EgoApproach(ScriptPart):
 class ScriptedTest(ScriptPart):
     """The script of a test.
 
-    ``name`` and ``parameters`` say which case of a suite it is.
+    ``name`` and ``parameters`` say which case of a suite it is. ``board``: events that move the
+    testers that have neither stages nor a track, in place of these.
     """
 
     name: str = ""
     parameters: dict[str, bool | int | float | str] = Field(default_factory=dict)
     ego: EgoApproach
     testers: tuple[Programme, ...] = Field(min_length=1)
+    board: Storyboard | None = None
 
     @field_validator("parameters", mode="before")
     @classmethod
@@ -256,6 +262,13 @@ class ScriptedTest(ScriptPart):
         return Begins.model_validate({"ego_at_m": at[0], "own_at_m": at[1]})
 
     @model_validator(mode="after")
+    def _told(self) -> Self:
+        known = {EGO, *(f"tester{i}" for i in range(len(self.testers)))}
+        if self.board is not None and (unknown := sorted(self.board.bodies - known)):
+            raise ValueError(f"board: there is no body {unknown[0]!r}")
+        return self
+
+    @model_validator(mode="after")
     def _meet(self) -> Self:
         for tester, begins in zip(self.testers, self.commitments, strict=True):
             own = begins.own_at_m if begins else None
@@ -281,4 +294,9 @@ class ScriptedTest(ScriptPart):
                 if begins.own_at_m is not None:
                     needed = tester.motion.when(begins.own_at_m)
                 marks.append(begins.ego_at_m - v * needed)
+        for action in self.board.arrivals if self.board else ():
+            assert action.ego_at_m is not None
+            assert action.own_at_m is not None
+            speed = self.testers[int(action.body.removeprefix("tester"))].speed_mps
+            marks.append(action.ego_at_m - v * action.arrival(0.0, speed).when(action.own_at_m))
         return max(self.ego.start_m, min(marks))

@@ -1,0 +1,180 @@
+"""Published crosswalks step by step, and the estimators that work over time on them."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+from cavsumo.model.crosswalk import STARTS, failures
+from cavsumo.probability import shifted
+from cavsumo.probability.disturbed_crosswalk import DisturbedCrosswalk
+from cavsumo.probability.noisy import ENDED, FAILED, RUNNING, NoisyProcess, counted
+from cavsumo.probability.shifted import estimate_by_shifts, learned_shift, shifted_runs
+from cavsumo.probability.splitting import estimate_by_splitting, split
+from cavsumo.probability.tree import Floats
+from cavsumo.probability.yielding_crosswalk import (
+    YieldingCrosswalk,
+    chosen_acceleration,
+    following_acceleration,
+    overlapping,
+)
+
+
+@dataclasses.dataclass(frozen=True)
+class Sum:
+    """Ten steps of one number each; a run fails when their sum passes 8: 1 - Phi(8 / sqrt 10)."""
+
+    horizon: int = 10
+    numbers: int = 1
+
+    def begin(self, count: int) -> Floats:
+        """Time, sum and whether it runs."""
+        return np.zeros((count, 3))
+
+    def moved(self, states: Floats, drawn: Floats) -> Floats:
+        """Add a number; only the sum at the end counts."""
+        time, total = states[:, 0] + 1.0, states[:, 1] + drawn[:, 0]
+        last = np.where(time < 10.0, RUNNING, np.where(total > 8.0, FAILED, ENDED))
+        return np.stack([time, total, last], axis=1)
+
+    def score(self, states: Floats) -> Floats:
+        """The sum so far, less what remains to be gained as the time runs out."""
+        return np.where(states[:, 2] == FAILED, 100.0, states[:, 1] + 0.5 * (10.0 - states[:, 0]))
+
+    def features(self, states: Floats) -> Floats:
+        """The sum, scaled."""
+        return states[:, 1:2] / 5.0
+
+
+SUM_P = 0.005706  # 1 - Phi(8 / sqrt(10))
+
+
+def played(process: NoisyProcess, numbers: Floats) -> Floats:
+    """The last states of runs with given numbers, shape (n, horizon, numbers)."""
+    states = process.begin(len(numbers))
+    for step in range(process.horizon):
+        go = np.flatnonzero(states[:, -1] == RUNNING)
+        states[go] = process.moved(states[go], numbers[go, step])
+    return states
+
+
+@pytest.mark.parametrize("start", STARTS)
+def test_the_stress_tests_crosswalk_is_the_one_of_the_suite(start: object) -> None:
+    """With the same numbers the same runs fail."""
+    process = DisturbedCrosswalk(start)  # type: ignore[arg-type]
+    numbers = 1.3 * np.random.default_rng(4).standard_normal((800, 50, 4))
+    failed = played(process, numbers)[:, -1] == FAILED
+    assert (failed == failures(process.start, numbers)).all()
+    assert failed.any()
+
+
+def test_the_yielding_car_stops_before_the_crosswalk() -> None:
+    """Without noise: the pedestrian walks at 1 m/s, and the car waits before the line."""
+    process = YieldingCrosswalk()
+    states, speeds = process.begin(1), []
+    while states[0, -1] == RUNNING:
+        states = process.moved(states, np.zeros((1, 5)))
+        speeds.append(states[0, 5])
+    assert states[0, -1] == ENDED
+    assert states[0, 0] > 13.0
+    assert states[0, 2] == pytest.approx(1.0, abs=0.02)
+    assert min(speeds) < 1.0
+    assert states[0, 4] + 2.0 < 22.0
+
+
+def test_the_yielding_car_by_hand() -> None:
+    """Free driving, a standing leader, and a crosswalk that is clear as somebody has left it."""
+    one = np.ones(1)
+    assert following_acceleration(8.0 * one, 0.0 * one, 22.0 * one)[0] == pytest.approx(
+        3.0 * (1 - 0.8**4 - ((5 + 12 + 64 / (2 * 6**0.5)) / 22) ** 2)
+    )
+    assert following_acceleration(one, 0.0 * one, -one)[0] == -9.0
+    left = chosen_acceleration(0.0 * one, 8.0 * one, 15.0 * one, 0.0 * one, one)
+    assert left[0] == pytest.approx(2.0)
+    inside = chosen_acceleration(0.0 * one, 8.0 * one, 8.0 * one, 0.0 * one, one)
+    assert inside[0] == following_acceleration(8.0 * one, 0.0 * one, 22.0 * one)[0]
+
+
+def test_boxes_overlap_as_they_are_turned() -> None:
+    """A pedestrian beside the car at 1.41 m: only a box turned by 45 degrees reaches it."""
+    straight = [10.0 + 1.41, 0.0, 1.0, 0.0, 25.0, 0.0, RUNNING]
+    turned = [10.0 + 1.41, 0.0, 1.0, 1.0, 25.0, 0.0, RUNNING]
+    away = [10.0 + 1.61, 0.0, 1.0, 1.0, 25.0, 0.0, RUNNING]
+    found = overlapping(np.array([straight, turned, away]))
+    assert found.tolist() == [False, True, False]
+
+
+def test_runs_by_chance_are_counted() -> None:
+    """Of 40,000 runs about 228 fail; all have ten steps."""
+    found = counted(Sum(), 40_000, np.random.default_rng(1))
+    assert (found.runs, found.steps) == (40_000, 400_000)
+    assert found.failures == pytest.approx(40_000 * SUM_P, abs=60)
+
+
+def test_splitting_is_unbiased_and_repeats() -> None:
+    """Many small replicas: their mean is the probability; the same generator, the same digits."""
+    found = split(Sum(), np.random.default_rng(2), 300, 40)
+    error = found.estimates.std() / 300**0.5
+    assert abs(found.estimates.mean() - SUM_P) < 4.0 * error
+    assert error < 0.1 * SUM_P
+    one, two = (estimate_by_splitting(Sum(), np.random.default_rng(5), 20, 50) for _ in range(2))
+    assert one == two
+    assert one.estimate.refused == ""
+    assert one.estimate.lower <= SUM_P <= one.estimate.upper
+    assert one.estimate.episodes > 1000
+
+
+def test_splitting_is_refused_where_nothing_is_reached() -> None:
+    """A score that never rises: all runs of a replica have the same best one."""
+
+    class Flat(Sum):
+        def score(self, states: Floats) -> Floats:
+            return np.where(states[:, 2] == FAILED, 100.0, 0.0)
+
+    found = estimate_by_splitting(Flat(), np.random.default_rng(1), 5, 10)
+    assert found.estimate.refused == "no replica reached a failure"
+
+
+def test_shifts_cover_and_gain() -> None:
+    """Ten estimates of few runs: the mean is the probability, at most one interval misses it."""
+    found = [estimate_by_shifts(Sum(), np.random.default_rng(s), 2000).estimate for s in range(10)]
+    assert not any(one.refused for one in found)
+    assert sum(one.lower <= SUM_P <= one.upper for one in found) >= 9
+    assert np.mean([one.p for one in found]) == pytest.approx(SUM_P, rel=0.05)
+    assert np.std([one.p for one in found]) < 0.3 * (SUM_P / 2000) ** 0.5
+
+
+def test_wide_exploration_is_weighed_exactly() -> None:
+    """Runs that are spread wider are an estimate, too, and so are those of any shift."""
+    rng = np.random.default_rng(3)
+    wide = shifted_runs(Sum(), None, 40_000, rng)
+    assert wide.terms.mean() == pytest.approx(SUM_P, rel=0.15)
+    shift = learned_shift(Sum(), [wide])
+    far = dataclasses.replace(shift, coefficients=shift.coefficients + 0.3)
+    assert shifted_runs(Sum(), far, 40_000, rng).terms.mean() == pytest.approx(SUM_P, rel=0.1)
+
+
+def test_shifts_are_refused_without_failures(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Nothing fails, so nothing is learned and nothing is claimed."""
+
+    class Never(Sum):
+        def moved(self, states: Floats, drawn: Floats) -> Floats:
+            found = super().moved(states, drawn)
+            found[:, 2] = np.where(found[:, 2] == FAILED, ENDED, found[:, 2])
+            return found
+
+    monkeypatch.setattr(shifted, "EXPLORED", 100)
+    monkeypatch.setattr(shifted, "LEARNED", (100,))
+    found = estimate_by_shifts(Never(), np.random.default_rng(1), 100)
+    assert found.estimate.refused == "no failure was drawn"
+
+
+def test_the_yielding_crosswalk_is_estimated_as_published() -> None:
+    """The published reference is 5.9e-5; an estimate of 19,000 runs has it in its interval."""
+    found = estimate_by_shifts(YieldingCrosswalk(), np.random.default_rng(1), 5000).estimate
+    assert found.refused == ""
+    assert found.p == pytest.approx(5.9e-5, rel=0.15)
+    assert found.lower <= 5.9e-5 * 1.05
+    assert found.upper >= 5.9e-5 * 0.95
