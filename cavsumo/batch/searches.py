@@ -17,7 +17,8 @@ from cavsumo.results.reading import rows_of
 from cavsumo.results.recorded_plan import recorded_plan
 from cavsumo.searchers.bounds import bounded, within_of
 from cavsumo.searchers.continued import SPACE, fingerprint
-from cavsumo.searchers.methods import check_method, method_of, packages_of
+from cavsumo.searchers.diversity import check_installed
+from cavsumo.searchers.methods import DIVERSITY, method_of, packages_of
 from cavsumo.searchers.protocol import GENERATION
 
 EARLIER = 2 * GENERATION  # points of an earlier search
@@ -44,9 +45,8 @@ def _search(
     ``later``: the files of the searches that begin with this one.
     """
     params = params_of(plan, label)
-    order = SearchOrder(
-        label, method_of(params), plan.seed, list(plan.cast).index(label), len(plan.agents)
-    )
+    turn, agents = list(plan.cast).index(label), len(plan.agents)
+    order = SearchOrder(label, method_of(params), plan.seed, turn, agents)
     space = bounded(prepared.space, within_of(params))
     search = Searching(space, order)
     if not params.get("earlier"):
@@ -92,8 +92,8 @@ def _check(
 ) -> None:
     """Refuse an earlier search of another space, or of a version that chose other points."""
     methods = [method_of(params_of(plan, k)) for k, agent in plan.cast.items() if agent == SEARCH]
-    for method in methods:
-        check_method(method, prepared.space)
+    if DIVERSITY in methods:
+        check_installed()
     for package, (was, is_) in unequal(manifest["versions"], versions(packages_of(methods))):
         if was is None:
             continue  # results of before it was recorded

@@ -22,9 +22,9 @@ from cavsumo.searchers.protocol import RandomSearch, Searcher
 from cavsumo.searchers.space import Space
 from cavsumo.searchers.tree import TreeSearch
 
-BY_DECISIONS = ("tree", "explore")
+BY_DECISIONS, DIVERSITY = ("tree", "explore"), "diversity"
 # Packages that choose points, besides numpy.
-PACKAGES = {"portfolio": ("cma",), "cma": ("cma",), "diversity": ("cma", "ribs")}
+PACKAGES = {"portfolio": ("cma",), "cma": ("cma",), DIVERSITY: ("cma", "ribs")}
 
 
 def _neighbours(space: Space, rng: np.random.Generator) -> Searcher:
@@ -43,7 +43,7 @@ SEARCHERS: Mapping[str, Callable[[Space, np.random.Generator], Searcher]] = {
     "manoeuvres": ManoeuvreSearch,
     "neighbours": _neighbours,
     "cma": EvolutionSearch,
-    "diversity": _diversity,
+    DIVERSITY: _diversity,
     "tree": lambda space, rng: TreeSearch(DecisionSpace(space), rng),
     "explore": lambda space, rng: ExploreSearch(DecisionSpace(space), rng),
 }
@@ -66,7 +66,7 @@ def packages_of(methods: Iterable[str]) -> list[str]:
 
 def check_method(method: str, space: Space) -> None:
     """Raise InputError where a method cannot search a space."""
-    if method == "diversity":
+    if method == DIVERSITY:
         check_installed()
     if method in BY_DECISIONS and bounds_numbers(space):
         raise InputError(
