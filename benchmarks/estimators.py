@@ -1,5 +1,9 @@
 """Estimators on functions of known probability: coverage, refusals, gain over Monte Carlo.
 
+With ``--half-width`` they may end at any look, as ``cavsumo estimate`` does, and the coverage is
+that of the interval with which each one ended; without it all episodes are played. The stratified
+estimator knows where the functions with discrete parts (``pedestrian``, ``lights``) are cut.
+
 Beside the methods of ``cavsumo estimate`` two that it does not offer: scrambled Sobol points (their
 interval is that of independent points), and subset simulation (Au and Beck 2001; eight independent
 runs, a t interval over them).
@@ -16,11 +20,13 @@ import numpy as np
 from scipy.special import ndtr, ndtri
 from scipy.stats import qmc, t
 
-from cavsumo.probability.methods import ESTIMATORS
+from cavsumo.probability.methods import ESTIMATORS, estimator
 from cavsumo.probability.protocol import Goal, PlayedVector
+from cavsumo.probability.stratified import Cut
 
 NEVER = 1e-9  # a half-width that is not reached
 DIMENSION = 6
+METHODS = (*ESTIMATORS, "sobol", "subset")
 SUBSETS, KEPT, MOST_LEVELS = 8, 0.2, 12
 
 
@@ -29,6 +35,7 @@ class Function(NamedTuple):
 
     margin: Callable
     p: float
+    cuts: tuple[Cut, ...] = ()
 
 
 def corner(u):
@@ -62,12 +69,20 @@ def pedestrian(u):
     return np.where(goes, near, -20.0)
 
 
+def lights(u):
+    """A fifth of those who neither look nor comply fail, and very few others."""
+    rare = (u[:, 4] < 0.073) & (u[:, 5] < 0.135)
+    return np.where(rare, 0.2 - u[:, 0], 1e-4 - u[:, 0])
+
+
+RARE = 0.073 * 0.135
 FUNCTIONS = {
     "corner": Function(corner, 1e-4),
     "corners": Function(corners, 2 * 0.08**3 - 0.08**6),
     "ball": Function(ball, math.pi**3 / 6 * 0.17**6),
     "scattered": Function(scattered, 1e-3),
-    "pedestrian": Function(pedestrian, math.nan),  # by 4 million points
+    "pedestrian": Function(pedestrian, math.nan, (Cut(4, 0.073),)),  # by 4 million points
+    "lights": Function(lights, 0.2 * RARE + 1e-4 * (1 - RARE), (Cut(4, 0.073), Cut(5, 0.135))),
 }
 
 
@@ -76,14 +91,17 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--episodes", type=int, default=2000)
     parser.add_argument("--replications", type=int, default=200)
+    parser.add_argument("--half-width", type=float, help="at which to end early; default: never")
+    parser.add_argument("--method", action="append", choices=METHODS)
+    parser.add_argument("--function", action="append", choices=FUNCTIONS)
     asked = parser.parse_args()
-    print("function    p        method       mean/p  rel. sd  coverage  refused  gain")
-    for name, function in FUNCTIONS.items():
+    print("function    p        method       mean/p  rel. sd  coverage  refused  played  gain")
+    for name in asked.function or FUNCTIONS:
+        function = FUNCTIONS[name]
         known = function if function.p == function.p else function._replace(p=_counted(function))
-        for method in (*ESTIMATORS, "sobol", "subset"):
-            print(
-                f"{name:10}  {row(known, method, asked.episodes, asked.replications)}", flush=True
-            )
+        for method in asked.method or METHODS:
+            goal = Goal(asked.episodes, asked.half_width or NEVER)
+            print(f"{name:10}  {row(known, method, goal, asked.replications)}", flush=True)
 
 
 def _counted(function: Function) -> float:
@@ -93,11 +111,11 @@ def _counted(function: Function) -> float:
     return float(np.mean(parts))
 
 
-def row(function: Function, method: str, episodes: int, replications: int) -> str:
+def row(function: Function, method: str, goal: Goal, replications: int) -> str:
     """The row of a method; a result is estimate, lower, upper, played, or refused."""
-    play = {"sobol": _sobol, "subset": _subset}.get(method) or _shipped(method)
+    play = {"sobol": _sobol, "subset": _subset}.get(method) or _shipped(method, function.cuts)
     streams = [np.random.default_rng([7, i]) for i in range(replications)]
-    found = [play(function.margin, episodes, rng) for rng in streams]
+    found = [play(function.margin, goal, rng) for rng in streams]
     kept = [one for one in found if not one[4]]
     estimates, played = np.array([one[0] for one in found]), np.mean([one[3] for one in found])
     spread = estimates.std(ddof=1) / function.p
@@ -105,35 +123,35 @@ def row(function: Function, method: str, episodes: int, replications: int) -> st
     gain = (1 - function.p) / function.p / played / spread**2 if spread else math.nan
     return (
         f"{function.p:.1e}  {method:11}  {estimates.mean() / function.p:6.2f}  {spread:7.2f}  "
-        f"{covered:8.3f}  {len(found) - len(kept):7}  {gain:4.2g}"
+        f"{covered:8.3f}  {len(found) - len(kept):7}  {played:6.0f}  {gain:4.2g}"
     )
 
 
-def _shipped(method: str):
+def _shipped(method: str, cuts: tuple[Cut, ...]):
     """One of the methods of cavsumo."""
 
-    def play(margin, episodes, rng):
-        estimator = ESTIMATORS[method](DIMENSION, Goal(episodes, NEVER), rng)
-        while not estimator.over:
-            margins = margin(estimator.ask())
-            estimator.tell([PlayedVector(bool(m > 0.0), float(m)) for m in margins])
-        last = estimator.history[-1]
+    def play(margin, goal, rng):
+        one = estimator(method, DIMENSION, goal, rng, cuts)
+        while not one.over:
+            margins = margin(one.ask())
+            one.tell([PlayedVector(bool(m > 0.0), float(m)) for m in margins])
+        last = one.history[-1]
         return last.p, last.lower, last.upper, last.episodes, bool(last.refused)
 
     return play
 
 
-def _sobol(margin, episodes, rng):
+def _sobol(margin, goal, rng):
     """Scrambled Sobol points, a power of two."""
-    count = 2 ** int(math.log2(episodes))
+    count = 2 ** int(math.log2(goal.episodes))
     failed = margin(qmc.Sobol(DIMENSION, rng=rng).random(count)) > 0.0
     half = 1.96 * failed.std() / math.sqrt(count)
     return failed.mean(), failed.mean() - half, failed.mean() + half, count, not failed.any()
 
 
-def _subset(margin, episodes, rng):
+def _subset(margin, goal, rng):
     """Independent runs of subset simulation and a t interval over them."""
-    runs = [_one_subset(margin, episodes // SUBSETS // 4, rng) for _ in range(SUBSETS)]
+    runs = [_one_subset(margin, goal.episodes // SUBSETS // 4, rng) for _ in range(SUBSETS)]
     values = np.array([one for one, _ in runs])
     half = t.ppf(0.975, SUBSETS - 1) * values.std(ddof=1) / math.sqrt(SUBSETS)
     mean = values.mean()

@@ -1,21 +1,25 @@
 """Exports of failures: valid, as recorded in another player, and the same collision there.
 
 Plays batches on several networks until each has failures enough, exports them as OpenSCENARIO with
-OpenDRIVE (and as CommonRoad), and asks others:
+OpenDRIVE and as CommonRoad, imports them again, and asks others:
 
-* the checkers ``qc_openscenario`` and ``qc_opendrive`` (pip install asam-qc-openscenarioxml
-  asam-qc-opendrive, in an environment of their own), which hold the schemas;
+* the checkers asam-qc-openscenarioxml and asam-qc-opendrive, which hold the schemas, in an
+  environment of their own (``--checkers``, its Python);
 * esmini, a player of OpenSCENARIO: where is every body at every timestep, and who collides when?
-* commonroad-io, in an environment of its own: do the occupancies of the same pair overlap first?
+* commonroad-io, in an environment of its own (``--commonroad``, its Python): is it valid by the
+  schema, whose occupancies overlap that of the ego first, and does the collision checker of
+  commonroad-drivability-checker say so too, where it is installed?
 
-    python benchmarks/exports.py --failures 34 --net crossing --net junction --net FILE.net.xml \\
-        --esmini esmini --checkers VENV/bin --commonroad VENV/bin/python
+    python benchmarks/exports.py --failures 17 --net crossing --net junction --net FILE.net.xml \\
+        --esmini esmini --checkers CHECKERS/bin/python --commonroad COMMONROAD/bin/python
 """
 
 from __future__ import annotations
 
 import argparse
+import contextlib
 import csv
+import io
 import json
 import math
 import re
@@ -26,23 +30,24 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from tempfile import TemporaryDirectory
+from typing import Any
 
 import cavsumo
 from cavsumo.cli import main as command
+from cavsumo.interop.commonroad import HEAD_COMMENT
 from cavsumo.interop.tracks import at_axle, stays
-from cavsumo.results.traces import Trace, read_trace
+from cavsumo.results.traces import Trace, read_trace, states
 
 KINDS = ("pedestrian", "car")
-CHECKERS = {
-    "test.xosc": ("qc_openscenario", "xoscBundle"),
-    "test.xodr": ("qc_opendrive", "xodrBundle"),
-}
-CONFIGURATION = """<Config><Param name="InputFile" value="{file}"/>
-<CheckerBundle application="{bundle}"><Param name="resultFile" value="{result}"/></CheckerBundle>
-</Config>"""
-ESMINI = "--osc test.xosc --headless --fixed_timestep 0.01 --csv_logger out.csv --collision"
-ESMINI_MORE = "--traj_filter 0 --logfile_path log.txt"
+COUNTS = "exported issues compared missing same tests commonroad checker imported".split()
+OTHERS = Path(__file__).parent / "exports_by_others"  # scripts for environments of their own
+ESMINI = (
+    "--osc test.xosc --headless --csv_logger out.csv --collision --traj_filter 0 "
+    "--logfile_path log.txt"
+)
+STEP_S = {"recorded": "0.01", "test": "0.05"}  # of esmini
 CELLS = {"x": 11, "y": 12, "heading": 24}  # behind the cell with the name of a body
+OF_A_BODY = 31  # cells
 
 
 @dataclass
@@ -57,7 +62,10 @@ class Found:
         missing: bodies that are there in one and not in the other.
         same: exports in which the same pair collides within a timestep.
         tests: exports as tests in which the ego and the tester collide.
-        commonroad: those in which commonroad-io finds the same collision.
+        commonroad: those that are valid and in which the occupancies overlap as they did.
+        checker: those in which the collision checker finds that pair too.
+        imported: imports, of both formats, with the same tracks and verdict.
+        seen: what the checkers said.
     """
 
     exported: int = 0
@@ -69,22 +77,32 @@ class Found:
     same: int = 0
     tests: int = 0
     commonroad: int = 0
-    seen: list[str] = field(default_factory=list)
+    checker: int = 0
+    imported: int = 0
+    seen: set[str] = field(default_factory=set)
+
+    def add(self, other: Found) -> None:
+        """Count those of another one too."""
+        for name in COUNTS:
+            setattr(self, name, getattr(self, name) + getattr(other, name))
+        self.far, self.turned = max(self.far, other.far), max(self.turned, other.turned)
+        self.seen |= other.seen
 
 
 def main() -> None:
     """Print the table."""
-    options = _parser().parse_args()
-    print(f"{'':<36}{'failures':>9}{'issues':>8}{'compared':>10}{'m':>9}{'rad':>9}{'missing':>9}"
-          f"{'same pair':>11}{'as test':>9}{'commonroad':>12}")  # fmt: skip
-    with TemporaryDirectory() as folder:
-        for net in options.net or ["crossing", "junction", "pedestrians"]:
-            for kind in KINDS:
+    options, all_of_them = _parser().parse_args(), Found()
+    heads = ("failures", "issues", "places", "m", "rad", "missing", "same pair", "as test",
+             "commonroad", "checker", "imported")  # fmt: skip
+    print(f"{'':<34}" + "".join(f"{head:>11}" for head in heads))
+    for net in options.net or ["crossing", "junction", "pedestrians"]:
+        for kind in KINDS:
+            with TemporaryDirectory() as folder:
                 found = _measured(net, kind, options, Path(folder))
-                print(
-                    _line(f"{Path(net).name.removesuffix('.net.xml')}, {kind}", found), flush=True
-                )
-                print(*found.seen, sep="\n", end="\n" if found.seen else "")
+            print(_line(f"{Path(net).name.removesuffix('.net.xml')}, {kind}", found), flush=True)
+            all_of_them.add(found)
+    print(_line("all", all_of_them))
+    print(*sorted(all_of_them.seen), sep="\n", end="\n" if all_of_them.seen else "")
 
 
 def _parser() -> argparse.ArgumentParser:
@@ -95,60 +113,83 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("--traffic", default="4", help="drawn background")
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--esmini", default=shutil.which("esmini"), help="the player")
-    parser.add_argument("--checkers", type=Path, help="the folder with qc_openscenario")
-    parser.add_argument("--commonroad", help="a Python with commonroad-io and shapely")
+    parser.add_argument("--checkers", help="a Python with the checkers")
+    parser.add_argument("--commonroad", help="a Python with commonroad-io")
     return parser
 
 
 def _measured(net: str, kind: str, options: argparse.Namespace, folder: Path) -> Found:
     """The failures of one network and kind, exported and played."""
-    file = folder / f"{Path(net).name}-{kind}.csv"
+    file = folder / "batch.csv"
     results = cavsumo.run(
         net, kind=kind, agents=["timing"], ego="constant", traffic=options.traffic,
-        runs=options.runs, seed=options.seed, output=file, progress=False,
+        reference="none", runs=options.runs, seed=options.seed, output=file, progress=False,
     )  # fmt: skip
-    found = Found()
+    found, traces = Found(), dict[Path, Trace]()
     for run in results.failures["run"].head(options.failures):
-        one = folder / f"{file.stem}-{run}"
-        found.exported += 1
-        trace = read_trace(folder / file.stem / f"run{run:06d}.jsonl.gz")
-        for way in ("recorded", "test"):
-            _export(file, run, "openscenario", one / way, way)
-            found.issues += issues(one / way, options.checkers, found.seen)
+        one = folder / f"run{run}"
+        traces[one] = read_trace(folder / "batch" / f"run{run:06d}.jsonl.gz")
+        for to, way in (("openscenario", "recorded"), ("openscenario", "test"),
+                        ("commonroad", "recorded")):  # fmt: skip
+            _export(file, run, to, one / (way if to == "openscenario" else to), way)
+    found.exported = len(traces)
+    if options.checkers and traces:
+        _check(found, list(traces), options.checkers)
+    if options.commonroad and traces:
+        _read(found, traces, options.commonroad)
+    for one, trace in traces.items():
         if options.esmini:
-            add(found, trace, one, options.esmini)
-        if options.commonroad:
-            _export(file, run, "commonroad", one / "commonroad")
-            said = asked_commonroad(options.commonroad, one / "commonroad" / "test.xml")
-            found.commonroad += same_collision(said, trace)
+            _play(found, trace, one, options.esmini)
+        for name in ("recorded/test.xosc", "commonroad/test.xml"):
+            found.imported += _imported(one / name, net, trace)
     return found
 
 
-def _export(file: Path, run: int, to: str, folder: Path, way: str = "recorded") -> None:
+def _call(*words: str) -> str:
+    """Call a command of cavsumo, which must not fail; its output."""
+    with contextlib.redirect_stdout(io.StringIO()) as said, contextlib.redirect_stderr(said):
+        if command(words) != 0:
+            sys.exit(f"{' '.join(words)}: {said.getvalue()}")
+    return said.getvalue()
+
+
+def _export(file: Path, run: int, to: str, folder: Path, way: str) -> None:
     """Export an episode into a new folder."""
     folder.mkdir(parents=True)
-    words = ["export", str(file), str(run), "--to", to, "-o", str(folder)]
-    if command([*words, *(["--as", way] if way != "recorded" else [])]) != 0:
-        sys.exit(f"run {run} of {file.name} was not exported")
+    _call("export", str(file), str(run), "--to", to, "--as", way, "-o", str(folder))
 
 
-def issues(folder: Path, checkers: Path | None, seen: list[str]) -> int:
-    """How many errors and warnings the checkers name."""
-    if checkers is None:
-        return 0
-    found = 0
-    for name, (program, bundle) in CHECKERS.items():
-        file, settings, result = folder / name, folder / "settings.xml", folder / f"{name}.xqar"
-        settings.write_text(CONFIGURATION.format(file=file, bundle=bundle, result=result), "utf-8")
-        subprocess.run([checkers / program, "-c", settings], check=True, capture_output=True)
-        text = result.read_text("utf-8")
-        named = re.findall(r'ruleUID="([^"]+)"', text.partition("<Issue ")[2])
-        seen += [f"  {folder.parent.name} {name}: {rule}" for rule in sorted({*named})]
-        found += text.count("<Issue ")
-    return found
+def _imported(file: Path, net: str, trace: Trace) -> bool:
+    """Whether an export, imported, has the same tracks to 1e-6 and the same verdict."""
+    out = file.with_suffix(".jsonl.gz")
+    said = _call("import", str(file), "--net", net, "-o", str(out))
+    again = read_trace(out)
+    return "as in the file" in said and len(again.frames) == len(trace.frames) and all(
+        alike(one, other) for one, other in zip(trace.frames, again.frames, strict=True)
+    )  # fmt: skip
 
 
-def add(found: Found, trace: Trace, folder: Path, esmini: str) -> None:
+def alike(one: Mapping[str, Any], other: Mapping[str, Any]) -> bool:
+    """Whether the same bodies are in two frames, at the same places to 1e-6."""
+    a, b = ({(part, name): pose for part, name, pose in states(f)} for f in (one, other))
+    return one["time_s"] == other["time_s"] and a.keys() == b.keys() and all(
+        abs(x - y) < 1e-6 for name in a for x, y in zip(a[name], b[name], strict=True)
+    )  # fmt: skip
+
+
+def _check(found: Found, folders: Sequence[Path], python: str) -> None:
+    """Ask the checkers about the scenarios, and about each road file once."""
+    roads = {(one / "recorded" / "test.xodr").read_bytes(): one for one in folders}
+    files = [one / way / "test.xosc" for one in folders for way in STEP_S]
+    files += [one / "recorded" / "test.xodr" for one in roads.values()]
+    subprocess.run([python, OTHERS / "check.py", *map(str, files)], check=True, capture_output=True)
+    for file in files:
+        text = file.with_name(f"{file.name}.xqar").read_text("utf-8")
+        found.issues += text.count("<Issue ")
+        found.seen |= {*re.findall(r'<Issue [^>]*ruleUID="([^"]+)"', text)}
+
+
+def _play(found: Found, trace: Trace, folder: Path, esmini: str) -> None:
     """Play an export as recorded and as a test, and add what is seen."""
     far, turned, compared, missing = deviations(trace, play(folder / "recorded", esmini))
     found.far, found.turned = max(found.far, far), max(found.turned, turned)
@@ -156,16 +197,16 @@ def add(found: Found, trace: Trace, folder: Path, esmini: str) -> None:
     tester, time = trace.row["tester"], float(trace.row["violation_time_s"])
     met = collisions(folder / "recorded").get(tester, math.inf)
     found.same += abs(met - time) <= step(trace) + 1e-6
-    play(folder / "test", esmini)
+    play(folder / "test", esmini, STEP_S["test"])
     found.tests += tester in collisions(folder / "test")
 
 
 Played = Mapping[int, Mapping[str, tuple[float, float, float]]]  # by hundredths of a second
 
 
-def play(folder: Path, esmini: str) -> Played:
+def play(folder: Path, esmini: str, step_s: str = STEP_S["recorded"]) -> Played:
     """Play an export: where every body is, by the time in hundredths of a second."""
-    words = [esmini, *ESMINI.split(), *ESMINI_MORE.split()]
+    words = [esmini, *ESMINI.split(), "--fixed_timestep", step_s]
     subprocess.run(words, cwd=folder, capture_output=True, timeout=200, check=True)
     east, north = _offset(folder / "test.xodr")
     return {time: {name: (x - east, y - north, o) for name, x, y, o in bodies}
@@ -174,14 +215,20 @@ def play(folder: Path, esmini: str) -> Played:
 
 def _rows(file: Path) -> Iterator[tuple[int, list[tuple[str, float, float, float]]]]:
     """The rows of esmini's table."""
+    x, y, heading = CELLS.values()
     with file.open(encoding="utf-8") as stream:
         for row in csv.reader(stream, skipinitialspace=True):
-            if len(row) > max(CELLS.values()) and row[0].isdecimal():
-                at = range(2, len(row) - max(CELLS.values()), 31)
+            if len(row) > OF_A_BODY and row[0].isdecimal():
+                at = range(2, len(row) - heading, OF_A_BODY)
                 yield (
                     round(100 * float(row[1])),
                     [
-                        (row[i].strip(), *(float(row[i + k]) for k in CELLS.values()))  # type: ignore[misc]
+                        (
+                            row[i].strip(),
+                            float(row[i + x]),
+                            float(row[i + y]),
+                            float(row[i + heading]),
+                        )
                         for i in at
                     ],
                 )
@@ -196,30 +243,26 @@ def _offset(file: Path) -> tuple[float, float]:
 def deviations(trace: Trace, played: Played) -> tuple[float, float, int, int]:
     """The largest deviation in m and rad, the places compared, and those that are missing."""
     far = turned = 0.0
-    compared = missing = 0
+    expected = set[tuple[int, str]]()
     for body in stays(trace):
-        for track in body.tracks:
-            for one in at_axle(body.shape, track):
-                there = played.get(round(100 * one.time), {}).get(body.name)
-                if there is None:
-                    missing += 1
-                    continue
-                compared += 1
+        for one in (point for track in body.tracks for point in at_axle(body.shape, track)):
+            time = round(100 * one.time)
+            expected.add((time, body.name))
+            if (there := played.get(time, {}).get(body.name)) is not None:
                 far = max(far, math.dist(there[:2], (one.x, one.y)))
                 turned = max(turned, abs(math.remainder(there[2] - one.heading, math.tau)))
-    expected = {(round(100 * frame["time_s"]), name) for frame in trace.frames
-                for name in ("ego", *frame["testers"], *frame["background"])}  # fmt: skip
     times = {time for time, _ in expected}
-    more = {(time, name) for time in times for name in played.get(time, ())} - expected
-    return far, turned, compared, missing + len(more)
+    there_too = {(time, name) for time in times for name in played.get(time, ())}
+    return far, turned, len(expected & there_too), len(expected ^ there_too)
 
 
 def collisions(folder: Path) -> dict[str, float]:
     """When the ego first touches which body [s]."""
     text = (folder / "log.txt").read_text(encoding="utf-8")
-    hits = re.findall(r"\[([\d.]+)\] \[warn\] Collision between (\S+) and (\S+)", text)
     found: dict[str, float] = {}
-    for time, one, other in hits:
+    for time, one, other in re.findall(
+        r"\[([\d.]+)\] \[warn\] Collision between (\S+) and (\S+)", text
+    ):
         if "ego" in (one, other):
             found.setdefault(other if one == "ego" else one, float(time))
     return found
@@ -230,40 +273,31 @@ def step(trace: Trace) -> float:
     return float(trace.head["plan"]["scenario"]["step_length"])
 
 
-ASK = """
-import json, sys
-from commonroad.common.file_reader import CommonRoadFileReader
-from commonroad.common.util import Interval
-scenario, problems = CommonRoadFileReader(sys.argv[1]).open()
-ego = problems.planning_problem_dict
-bodies = {o.obstacle_id: o for o in scenario.dynamic_obstacles}
-"""
-
-
-def asked_commonroad(python: str, file: Path) -> Sequence[tuple[str, float]]:
-    """The bodies whose occupancies overlap that of the ego, with the time [s] at which first."""
+def _read(found: Found, traces: Mapping[Path, Trace], python: str) -> None:
+    """Ask commonroad-io about the exports."""
+    files = [one / "commonroad" / "test.xml" for one in traces]
     done = subprocess.run(
-        [python, "-c", ASK, str(file)], capture_output=True, text=True, check=True
+        [python, OTHERS / "read.py", *map(str, files)], capture_output=True, text=True, check=True
     )
-    return [(str(name), float(time)) for name, time in json.loads(done.stdout)]
-
-
-def same_collision(said: Sequence[tuple[str, float]], trace: Trace) -> bool:
-    """Whether the first collision is that of the trace, within a timestep."""
-    if not said:
-        return False
-    name, time = min(said, key=lambda one: one[1])
-    right = abs(time - float(trace.row["violation_time_s"])) <= step(trace) + 1e-6
-    return right and name == trace.row["tester"]
+    for file, said, trace in zip(
+        files, json.loads(done.stdout.splitlines()[-1]), traces.values(), strict=True
+    ):
+        head = HEAD_COMMENT.search(file.read_text("utf-8"))
+        assert head is not None
+        names = json.loads(head[1])["ids"]
+        hits = {names[number]: at * step(trace) for number, at in said["hits"].items()}
+        tester, when = trace.row["tester"], float(trace.row["violation_time_s"])
+        right = abs(hits.get(tester, math.inf) - when) <= step(trace) + 1e-6
+        whole = said["valid"] and said["lanelets"] > 0 and said["problems"] == 1
+        found.commonroad += whole and right
+        found.checker += tester in {names[str(one)] for one in said["checker"] or ()}
 
 
 def _line(name: str, found: Found) -> str:
     """A row of the table."""
-    return (
-        f"{name:<36}{found.exported:>9}{found.issues:>8}{found.compared:>10}{found.far:>9.5f}"
-        f"{found.turned:>9.5f}{found.missing:>9}{found.same:>11}{found.tests:>9}"
-        f"{found.commonroad:>12}"
-    )
+    counts = [getattr(found, name) for name in COUNTS]
+    cells = [*counts[:3], f"{found.far:.5f}", f"{found.turned:.5f}", *counts[3:]]
+    return f"{name:<34}" + "".join(f"{cell:>11}" for cell in cells)
 
 
 if __name__ == "__main__":

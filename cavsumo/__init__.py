@@ -27,6 +27,7 @@ if TYPE_CHECKING:
     from cavsumo.api.running import run_study as run_study
     from cavsumo.api.running import search as search
     from cavsumo.api.suites import suite as suite
+    from cavsumo.api.transferring import transfer as transfer
     from cavsumo.assertions.base import Assertion as Assertion
     from cavsumo.assertions.base import Judgement as Judgement
     from cavsumo.egos.base import Acceleration as Acceleration
@@ -50,6 +51,7 @@ _PUBLIC = {
     "suite": "api.suites",
     "minimise": "api.kept",
     "regress": "api.kept",
+    "transfer": "api.transferring",
     "Results": "api.results",
     "Estimation": "api.estimating",
     "RecordedEpisode": "api.episodes",

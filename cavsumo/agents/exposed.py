@@ -1,4 +1,4 @@
-"""The agent whose pedestrians do what an exposure says: they arrive, look or not, and walk.
+"""The agent whose bodies do what an exposure says: they arrive, look or not, and go or stay.
 
 An estimator in the parent process (``batch.estimating``) chooses random vectors and sends what they
 mean, so an episode is replayed without it.
@@ -13,8 +13,10 @@ from typing import Any, ClassVar, NamedTuple
 import numpy as np
 
 from cavsumo.agents.base import AGENTS, Agent
+from cavsumo.agents.exposed_drives import ExposedDrive, ExposedDriver
 from cavsumo.agents.names import ESTIMATE_METHODS, EXPOSURE
 from cavsumo.agents.programme import ProgrammedWalk, WalkProgramme
+from cavsumo.agents.programmed_manoeuvres import DriveProgramme
 from cavsumo.agents.recorded import start_of
 from cavsumo.model.bodies import Action
 from cavsumo.model.checks import choice, number
@@ -76,7 +78,7 @@ class ExposedWalk(ProgrammedWalk):
 
 @AGENTS.register(EXPOSURE)
 class ExposureAgent(Agent):
-    """Pedestrians who arrive and cross as an exposure says, to estimate how often the ego fails."""
+    """People who arrive and cross as an exposure says, to estimate how often the ego fails."""
 
     PARAMETERS: ClassVar[Mapping[str, str]] = {
         "method": f"estimator: {', '.join(ESTIMATE_METHODS)} (docs/probability.md)",
@@ -86,7 +88,6 @@ class ExposureAgent(Agent):
     }
     FILES: ClassVar[tuple[str, ...]] = ("exposure",)
     sees_background = False
-    drives = False
     searches = True
 
     def __init__(
@@ -103,11 +104,19 @@ class ExposureAgent(Agent):
             raise ValueError("half_width must be above 0, got 0")
         self.bound = number("bound", bound, 0.0, 1.0)
         self._walkers: list[ExposedPedestrian | None] = []
+        self._drivers: list[ExposedDriver | None] = []
 
     def reset(self, scene: Scene, owned: Sequence[int], rng: np.random.Generator) -> None:
         super().reset(scene, owned, rng)
-        walkers = self._walkers or [None] * len(owned)
-        self._walks = [ExposedWalk(scene, i, one) for i, one in zip(owned, walkers, strict=True)]
+        nobody = [None] * len(owned)
+        self._walks = [
+            ExposedDrive(scene, i, driver)
+            if scene.starts[i].approach
+            else ExposedWalk(scene, i, walker)
+            for i, walker, driver in zip(
+                owned, self._walkers or nobody, self._drivers or nobody, strict=True
+            )
+        ]
 
     def choose_action(self, snapshot: Snapshot) -> tuple[Action, ...]:
         return tuple(
@@ -116,14 +125,23 @@ class ExposureAgent(Agent):
         )
 
     def recall(self) -> Any:
-        walkers = [
-            one and {**one._asdict(), "programme": [*one.programme]} for one in self._walkers
-        ]
-        return {"starts": self.recorded_starts, "walkers": walkers}
+        memory = {"starts": self.recorded_starts, "walkers": _plain(self._walkers)}
+        if self._drivers:
+            memory = {"starts": self.recorded_starts, "drivers": _plain(self._drivers)}
+        return memory
 
     def remember(self, memory: Mapping[str, Any]) -> None:
         self.recorded_starts = [start_of(start) for start in memory["starts"]]
         self._walkers = [
             one and ExposedPedestrian(**{**one, "programme": WalkProgramme(*one["programme"])})
-            for one in memory["walkers"]
+            for one in memory.get("walkers", ())
         ]
+        self._drivers = [
+            one and ExposedDriver(**{**one, "programme": DriveProgramme(*one["programme"])})
+            for one in memory.get("drivers", ())
+        ]
+
+
+def _plain(people: Sequence[ExposedPedestrian | ExposedDriver | None]) -> list[Any]:
+    """People as plain data."""
+    return [one and {**one._asdict(), "programme": [*one.programme]} for one in people]

@@ -46,7 +46,7 @@ SEARCH_METHODS = (
     "portfolio", "random", "manoeuvres", "neighbours", "cma", "diversity", "tree", "explore",
 )  # fmt: skip
 EXPOSURE = "exposure"  # the agent whose random vectors an estimator chooses, by one of these
-ESTIMATE_METHODS = ("auto", "monte-carlo", "importance")
+ESTIMATE_METHODS = ("auto", "monte-carlo", "stratified", "importance")
 
 PREFIX = "policy:"
 

@@ -57,12 +57,12 @@ def estimate(
     max_episodes: int = 2000,
     **arguments: Any,
 ) -> Estimation:
-    """Estimate how often an ego fails preventably when pedestrians do what an exposure says.
+    """Estimate how often an ego fails preventably when people do what an exposure says.
 
     Args:
         net: see ``run``.
         exposure: a TOML file (docs/probability.md); None for the default.
-        method: auto, monte-carlo or importance.
+        method: auto, monte-carlo, stratified or importance.
         half_width: end when half of the interval is at most so much of the estimate.
         bound: end when the interval's upper end is at most this; None for never.
         max_episodes: the most to play.

@@ -22,9 +22,10 @@ from cavsumo.batch.prepared import PreparedBatch
 from cavsumo.model.bodies import kind_named
 from cavsumo.probability.encounters import Encounters, encounters_of
 from cavsumo.probability.exposure import exposure_of
-from cavsumo.probability.methods import ESTIMATORS
+from cavsumo.probability.methods import estimator
 from cavsumo.probability.protocol import Goal, PlayedVector
 from cavsumo.probability.tree import Floats
+from cavsumo.probability.vehicle_encounters import VehicleEncounters
 from cavsumo.probability.weights import Estimate
 from cavsumo.results.failures import graded
 from cavsumo.results.rows import cell
@@ -87,8 +88,8 @@ class Estimating:
         goal = Goal(plan.runs, agent.half_width, agent.bound or None)
         seed = np.random.SeedSequence([plan.seed, zlib.crc32(EXPOSURE.encode())])
         self._rng = np.random.default_rng(seed)
-        make = ESTIMATORS[agent.method]
-        self._estimator = make(self.encounters.dimension, goal, self._rng)
+        found = self.encounters
+        self._estimator = estimator(agent.method, found.dimension, goal, self._rng, found.cuts)
         self.vectors: list[Floats] = []
         self._generation = range(0)  # episodes of the vectors that were asked for last
         self._told: dict[int, PlayedVector] = {}
@@ -138,7 +139,7 @@ class Estimating:
             seconds=math.fsum(self._lasted.values()),
             errors=len(self._errors),
             gain=self._estimator.gain(),
-            per_hour=self.encounters.exposure.arrivals.per_hour,
+            per_hour=self.encounters.per_hour,
         )
 
     def _number(self, run: int) -> int:
@@ -164,7 +165,7 @@ class Estimating:
         return self._rng.random((BEYOND, self.encounters.dimension))
 
 
-def encounters_of_batch(prepared: PreparedBatch, label: str) -> Encounters:
+def encounters_of_batch(prepared: PreparedBatch, label: str) -> Encounters | VehicleEncounters:
     """The encounters of an agent; raises InputError where its exposure has no support."""
     scenario, member = prepared.plan.scenario, prepared.cast[label]
     kind, exposure = kind_named(scenario.kind), exposure_of(member.params)

@@ -38,7 +38,7 @@ from cavsumo.probability.exposure import exposure_of
 from cavsumo.probability.methods import check_episodes
 from cavsumo.results.present import input_files
 from cavsumo.results.provenance import checksums, traffic_checksum, unequal, versions
-from cavsumo.searchers.bounds import bounded
+from cavsumo.searchers.bounds import bounded, within_of
 from cavsumo.searchers.continued import SPACE, fingerprint
 from cavsumo.searchers.methods import check_method, method_of, packages_of
 from cavsumo.searchers.space import Space, space_of
@@ -198,7 +198,7 @@ def _prepared(plan: BatchPlan, ego: Ego | None) -> PreparedBatch:
     prepared = PreparedBatch(plan, cast, site, *where, objects=objects)
     for member in cast:
         if member.name == SEARCH:  # a space without a start is refused too
-            space = bounded(prepared.space, str(member.params.get("within", "")))
+            space = bounded(prepared.space, within_of(member.params))
             check_method(method_of(member.params), space)
     return prepared
 

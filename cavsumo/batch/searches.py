@@ -15,7 +15,7 @@ from cavsumo.model.scenario import BatchPlan
 from cavsumo.results.provenance import unequal, versions
 from cavsumo.results.reading import rows_of
 from cavsumo.results.recorded_plan import recorded_plan
-from cavsumo.searchers.bounds import bounded
+from cavsumo.searchers.bounds import bounded, within_of
 from cavsumo.searchers.continued import SPACE, fingerprint
 from cavsumo.searchers.diversity import check_installed
 from cavsumo.searchers.methods import DIVERSITY, method_of, packages_of
@@ -47,14 +47,14 @@ def _search(
     params = params_of(plan, label)
     turn, agents = list(plan.cast).index(label), len(plan.agents)
     order = SearchOrder(label, method_of(params), plan.seed, turn, agents)
-    space = bounded(prepared.space, str(params.get("within", "")))
+    space = bounded(prepared.space, within_of(params))
     search = Searching(space, order)
     if not params.get("earlier"):
         return search
     file = prepared.plan.scenario.present(Path(str(params["earlier"])))
     if file in later:
         raise ResultsError(f"search.earlier {str(file)!r}: begins with itself")
-    earlier = _earlier(prepared, file, later, str(params.get("within", "")))
+    earlier = _earlier(prepared, file, later, within_of(params))
     sort = type(search.searcher.space)
     points = [point for space, point in earlier.best() if type(space) is sort]
     return Searching(space, order, points[:EARLIER])
@@ -69,7 +69,7 @@ def _earlier(
     if not labels:
         raise ResultsError(f"search.earlier {str(file)!r}: holds no search, only {plan.agents[0]}")
     _check(prepared, plan, manifest, f"search.earlier {str(file)!r}")
-    was = str(params_of(plan, labels[0]).get("within", ""))
+    was = within_of(params_of(plan, labels[0]))
     if was != within:
         raise ResultsError(
             f"search.earlier {str(file)!r}: is of another space: search.within was {was!r}, is "

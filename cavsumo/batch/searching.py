@@ -90,8 +90,6 @@ class Searching:
         self.spaces: list[PointSpace] = []
         self._generation: list[int] = []  # episodes of the points that were asked for last
         self._told: dict[int, PlayedPoint] = {}
-        self._testers: dict[int, int] = {}  # the body that the verdict of an episode names
-        self._lasted: dict[int, float] = {}
         self._uniform: set[int] = set()
 
     def ready(self, run: int) -> bool:
@@ -114,8 +112,6 @@ class Searching:
         if self.ready(run):
             number = self._number(run)
             self._told[number] = self._result(row)
-            self._testers[number] = _body(cell(row["tester"]))
-            self._lasted[number] = float(cell(row["time_s"]) or 0.0)
 
     def best(self) -> list[tuple[PointSpace, Point]]:
         """The points that were told, with their spaces: the best of each kind, then the others."""
@@ -130,11 +126,14 @@ class Searching:
         failed = [n for n in numbers if self._told[n].failed]
         first = None
         if failed:
-            first = failed[0] + 1, math.fsum(self._lasted[n] for n in numbers if n <= failed[0])
+            first = (
+                failed[0] + 1,
+                math.fsum(self._told[n].seconds for n in numbers if n <= failed[0]),
+            )
         played = [self.points[n] for n in numbers if self.spaces[n] is self.space]
         return SearchFacts(
             episodes=len(numbers),
-            seconds=math.fsum(self._lasted.values()),
+            seconds=math.fsum(self._told[n].seconds for n in numbers),
             failures=len(failed),
             distinct=len({self._told[n].kind for n in failed}),
             first=first,
@@ -163,16 +162,24 @@ class Searching:
         """The result of a point; a row of this session and one that was recorded tell the same."""
         grade, failed = graded(row)
         kind = kind_of({key: cell(row[key]) for key in FEATURES}) if failed else ()
-        return PlayedPoint(grade, failed, kind, tuple(read(cell(row["situations"]))))
+        situations = tuple(read(cell(row["situations"])))
+        return PlayedPoint(
+            grade, failed, kind, situations, _body(cell(row["tester"])), _seconds(row)
+        )
 
     def _failure(self, number: int) -> Failure:
         """The body that the ego failed in an episode."""
         played = self.spaces[number].played(self.points[number])
-        place, programme = played[self._testers[number]]
+        place, programme = played[self._told[number].body or 0]
         others = sum(one is not None for _, one in played) - (programme is not None)
         return Failure(place, programme, others)
 
 
-def _body(tester: str) -> int:
-    """The number of the body that a row names; the first one if it names none of the testers."""
-    return int(tester.removeprefix("tester")) if tester.startswith("tester") else 0
+def _body(tester: str) -> int | None:
+    """The number of the body that a row names; None if it names none of the testers."""
+    return int(tester.removeprefix("tester")) if tester.startswith("tester") else None
+
+
+def _seconds(row: Mapping[str, Any]) -> float:
+    """How long the episode of a row lasted [s]."""
+    return float(cell(row["time_s"]) or 0.0)

@@ -24,6 +24,7 @@ from cavsumo.interop.lanelets import CROSSING, PAVEMENT, Strip, strips
 from cavsumo.interop.openscenario import TEST, ExportPlace, write_all
 from cavsumo.interop.tracks import Stays, Track, TrackPoint, stays
 from cavsumo.model.bodies import BICYCLE, BUS, PEDESTRIAN
+from cavsumo.model.kinematics import wrap
 from cavsumo.model.polyline import Point
 from cavsumo.network.drawing.surfaces import credit
 from cavsumo.network.osm.netconvert import in_comment
@@ -34,6 +35,7 @@ XML = "test.xml"
 VERSION = "2020a"
 UNDATED = "2000-01-01"  # so that the same test gives the same bytes
 FIRST_BODY, PROBLEM = 100_001, 90_001  # ids, beyond those of lanelets
+DECIMALS = 12
 GOAL_M = 10.0, 5.0  # length and width of the goal, at the end of the ego's route
 TYPES = {PEDESTRIAN.name: "pedestrian", BICYCLE.name: "bicycle", BUS.name: "bus"}
 TYPES |= {"truck": "truck", "trailer": "truck", "motorcycle": "motorcycle", "moped": "motorcycle"}
@@ -161,7 +163,7 @@ def _add_state(parent: ET.Element, name: str, one: TrackPoint, dt: float) -> ET.
     """A body at a time step."""
     state = ET.SubElement(parent, name)
     _add_point(ET.SubElement(state, "position"), one.x, one.y)
-    _add_exact(state, "orientation", one.heading)
+    _add_exact(state, "orientation", wrap(one.heading))
     _add_exact(state, "time", round(one.time / dt))
     _add_exact(state, "velocity", one.speed)
     return state
@@ -176,7 +178,7 @@ def _add_problem(root: ET.Element, ego: Stays, place: ExportPlace, dt: float) ->
     goal = ET.SubElement(problem, "goalState")
     x, y, heading = place.path.at(max(0.0, place.path.length - GOAL_M[0] / 2.0))
     area = ET.SubElement(ET.SubElement(goal, "position"), "rectangle")
-    values = ("length", GOAL_M[0]), ("width", GOAL_M[1]), ("orientation", heading)
+    values = ("length", GOAL_M[0]), ("width", GOAL_M[1]), ("orientation", wrap(heading))
     for name, value in values:
         _add(area, name, value)
     centre = ET.SubElement(area, "center")
@@ -187,8 +189,10 @@ def _add_problem(root: ET.Element, ego: Stays, place: ExportPlace, dt: float) ->
     _add(when, "intervalEnd", max(1, round(place.horizon / dt)))
 
 
-def _add(parent: ET.Element, name: str, value: object) -> None:
-    """An element with a value."""
+def _add(parent: ET.Element, name: str, value: float | str) -> None:
+    """An element with a value; numbers have no exponent, which the schema does not allow."""
+    if isinstance(value, float):
+        value = f"{round(value, DECIMALS) + 0.0:.{DECIMALS}f}".rstrip("0").rstrip(".")
     ET.SubElement(parent, name).text = str(value)
 
 

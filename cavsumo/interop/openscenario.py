@@ -14,7 +14,6 @@ both. Bodies that enter late or leave early are added and deleted then.
 from __future__ import annotations
 
 import json
-import math
 from collections.abc import Iterator
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -37,6 +36,7 @@ from cavsumo.interop.storyboard_parts import (
 from cavsumo.interop.tracks import Stays, TrackPoint, at_axle, driven, moved, set_off, stays
 from cavsumo.model.polyline import Path as Polyline
 from cavsumo.network.drawing.surfaces import credit
+from cavsumo.network.reader import lane_path, read_network
 from cavsumo.results.traces import Trace
 
 XOSC = "test.xosc"
@@ -45,7 +45,6 @@ EXTRA = "pip install 'cavsumo[export]'"
 RECORDED, TEST = "recorded", "test"
 WAYS = (RECORDED, TEST)
 STRAIGHT_ON_S = 10.0  # for which a tester goes straight on behind the end of the record
-WAYPOINTS_M = 20.0  # from one to the next
 HALF = 0.5  # of a timestep before its first frame a body enters, and stands there
 
 
@@ -55,11 +54,13 @@ class ExportPlace(NamedTuple):
     Attributes:
         net: the network's file.
         path: the ego's path, from where its middle starts to where its front arrives.
+        edges: ids of the edges of its route.
         horizon: how long an episode may last [s].
     """
 
     net: Path
     path: Polyline
+    edges: tuple[str, ...]
     horizon: float
 
 
@@ -160,17 +161,29 @@ def _begins(xosc: Any, body: Stays, place: ExportPlace, way: str) -> Iterator[An
     if way == TEST and body.part != "background":
         yield standing_speed(xosc, first.speed)
     if way == TEST and body.part == "ego":
-        yield xosc.AssignRouteAction(_route(xosc, place.path))
+        yield xosc.AssignRouteAction(_route(xosc, place))
 
 
-def _route(xosc: Any, path: Polyline) -> Any:
-    """The ego's route as waypoints."""
-    route, parts = xosc.Route("route of ego"), max(1, math.ceil(path.length / WAYPOINTS_M))
-    for i in range(parts + 1):
-        x, y, heading = path.at(path.length * i / parts)
+def _route(xosc: Any, place: ExportPlace) -> Any:
+    """The ego's route as waypoints: where it begins, one on each road, and where it ends.
+
+    None is inside a junction, where several roads lie upon each other.
+    """
+    route = xosc.Route("route of ego")
+    for x, y, heading in waypoints(place):
         there = position(xosc, TrackPoint(0.0, x, y, heading, 0.0))
         route.add_waypoint(there, xosc.RouteStrategy.shortest)
     return route
+
+
+def waypoints(place: ExportPlace) -> list[tuple[float, float, float]]:
+    """Places on the ego's path, with headings: its ends, and near the middle of each edge."""
+    path, network = place.path, read_network(place.net)
+    found = {0.0, path.length}
+    for name in place.edges:
+        lane = lane_path(network.edge(name).getLanes()[-1:])
+        found.add(path.project(*lane.at(lane.length / 2.0)[:2]).along)
+    return [path.at(along) for along in sorted(found)]
 
 
 def _events(xosc: Any, body: Stays, ego: Stays, way: str, end: float) -> Iterator[Any]:

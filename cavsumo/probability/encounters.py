@@ -1,4 +1,4 @@
-"""Encounters of a site: a random vector says who arrives where and when, and what they do.
+"""Encounters with pedestrians: a random vector says who arrives where and when, and what they do.
 
 Each body has the coordinates ``NAMES``, each uniform on [0, 1] by chance, so the density of an
 encounter under the exposure is 1 and that of a vector of another proposal is the proposal's own:
@@ -15,12 +15,14 @@ from typing import Any
 from cavsumo.agents.programme import WalkProgramme
 from cavsumo.agents.recorded import Teams
 from cavsumo.errors import InputError, NetworkError
-from cavsumo.model.bodies import WALKING, Kind
+from cavsumo.model.bodies import CAR, WALKING, Kind
 from cavsumo.network.pedestrian_starts import APART_M
 from cavsumo.network.recorded_starts import start_record
 from cavsumo.network.site import Site
 from cavsumo.probability.exposure import Exposure
+from cavsumo.probability.stratified import Cut
 from cavsumo.probability.tree import Floats
+from cavsumo.probability.vehicle_encounters import KINDS, VehicleEncounters, vehicle_encounters
 from cavsumo.searchers.places import Place
 from cavsumo.searchers.walks import walks_at
 
@@ -59,6 +61,23 @@ class Encounters:
     def dimension(self) -> int:
         """How many numbers a vector has."""
         return self.bodies * len(self.names)
+
+    @property
+    def per_hour(self) -> float:
+        """Arrivals an hour."""
+        return self.exposure.arrivals.per_hour
+
+    @property
+    def cuts(self) -> tuple[Cut, ...]:
+        """The shares at which behaviour changes, in the order of the coordinates."""
+        chance = self.exposure
+        shares = {
+            "attention": chance.attention.inattentive,
+            ON_RED: chance.compliance.against_red,
+            STOPS[0]: chance.hesitation.share,
+        }
+        names = self.names * self.bodies
+        return tuple(Cut(i, shares[name]) for i, name in enumerate(names) if name in shares)
 
     def memories(self, vector: Floats) -> tuple[dict[str, Any], ...]:
         """The memories with which the agents of ``agents.exposed`` play a vector."""
@@ -115,10 +134,18 @@ class Encounters:
         raise NetworkError(f"no room for {self.bodies} testers on the pavements: use fewer")
 
 
-def encounters_of(site: Site, kind: Kind, teams: Teams, exposure: Exposure) -> Encounters:
-    """The encounters at a site; raises InputError where the exposure has no support there."""
+def encounters_of(
+    site: Site, kind: Kind, teams: Teams, exposure: Exposure, ego: Kind = CAR
+) -> Encounters | VehicleEncounters:
+    """The encounters at a site; raises InputError where the exposure has no support there.
+
+    ``ego``: the kind of the ego, which vehicles start apart from.
+    """
+    if kind.name in KINDS:
+        return vehicle_encounters(site, kind, ego, teams, getattr(exposure, kind.name))
     if kind.name not in WALKING:
-        raise InputError(f"exposure: kind {kind.name!r}: only {' and '.join(WALKING)}s have one")
+        known = f"{', '.join(WALKING)}, {' and '.join(KINDS)}"
+        raise InputError(f"exposure: kind {kind.name!r}: only {known} have one")
     try:
         exposure.speed_mps.within(SLOWEST_MPS, kind.v_max)
     except ValueError as error:

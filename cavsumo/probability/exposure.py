@@ -1,4 +1,4 @@
-"""The exposure: what pedestrians do by chance at a place, as a TOML file states it."""
+"""The exposure: what people do by chance at a place, as a TOML file states it."""
 
 from __future__ import annotations
 
@@ -48,8 +48,21 @@ class Hesitation(_Table):
     pause_s: Distribution
 
 
+class VehicleExposure(_Table):
+    """The exposure of cyclists or of drivers."""
+
+    arrivals: Arrivals
+    speed_mps: Distribution
+    critical_gap_s: Distribution
+    attention: Attention
+    compliance: Compliance
+
+
 class Exposure(_Table):
-    """An exposure; see ``default.toml`` for the meaning and the source of every number."""
+    """An exposure, of pedestrians but for the last two tables.
+
+    See ``default.toml`` for the meaning and the source of every number.
+    """
 
     arrivals: Arrivals
     speed_mps: Distribution
@@ -57,6 +70,8 @@ class Exposure(_Table):
     attention: Attention
     compliance: Compliance
     hesitation: Hesitation
+    bicycle: VehicleExposure
+    car: VehicleExposure
 
 
 def read_exposure(file: Path | None = None) -> Exposure:

@@ -41,7 +41,7 @@ class NoisyProcess(Protocol):
         """How near each state is to a failure, on any scale that increases."""
 
     def features(self, states: Floats) -> Floats:
-        """What a proposal may depend on, about in [-1, 1], shape (n, features)."""
+        """The numbers that a proposal may depend on, about in [-1, 1], shape (n, features)."""
 
 
 class SteppedEstimate(NamedTuple):
@@ -51,7 +51,7 @@ class SteppedEstimate(NamedTuple):
     steps: int
 
 
-class Counted(NamedTuple):
+class ChanceRuns(NamedTuple):
     """Runs by chance: how many, how many failed, and their steps."""
 
     runs: int
@@ -59,7 +59,7 @@ class Counted(NamedTuple):
     steps: int
 
 
-def counted(process: NoisyProcess, count: int, rng: np.random.Generator) -> Counted:
+def counted(process: NoisyProcess, count: int, rng: np.random.Generator) -> ChanceRuns:
     """Play runs by chance, as plain Monte Carlo does."""
     failures = steps = 0
     for done in range(0, count, AT_ONCE):
@@ -71,4 +71,4 @@ def counted(process: NoisyProcess, count: int, rng: np.random.Generator) -> Coun
             states = states[states[:, -1] == RUNNING]
             if not len(states):
                 break
-    return Counted(count, failures, steps)
+    return ChanceRuns(count, failures, steps)

@@ -129,7 +129,7 @@ def shifted_runs(
 def _of_failing(
     failed: np.ndarray, ratio: Floats, rows: list[tuple[np.ndarray, Floats, Floats]]
 ) -> ShiftedRuns:
-    """What is kept of some runs."""
+    """Some runs, with the steps of those that failed."""
     terms = np.where(failed, np.exp(np.where(failed, ratio, 0.0)), 0.0)
     number = np.cumsum(failed) - 1
     kept = [(number[go[failed[go]]], c[failed[go]], d[failed[go]]) for go, c, d in rows]

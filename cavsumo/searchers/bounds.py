@@ -11,6 +11,7 @@ import dataclasses
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 from cavsumo.agents.searched import Programme
 from cavsumo.errors import InputError, UnknownName
@@ -103,6 +104,11 @@ class BoundedMovements:
 def part(movements: Movements, name: str, wanted: Range) -> Range:
     """The part of a range of shares that movements permit; see ``BoundedMovements.part``."""
     return movements.part(name, wanted) if isinstance(movements, BoundedMovements) else wanted
+
+
+def within_of(params: Mapping[str, Any]) -> str:
+    """The bounds that a search's parameters ask for; empty for none."""
+    return str(params.get("within", ""))
 
 
 def bounds_numbers(space: Space) -> bool:

@@ -7,12 +7,15 @@ way; and two that act together. Every number that a manoeuvre leaves open is uni
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 
 import numpy as np
 
+from cavsumo.searchers.bounds import part
 from cavsumo.searchers.drives import THROUGH as ON_SHARE
+from cavsumo.searchers.expected import Expected, value_of
 from cavsumo.searchers.protocol import GENERATION, PlayedPoint
 from cavsumo.searchers.space import ALONE, AS_IT_BRAKES, TOGETHER, Point, Space
 
@@ -24,12 +27,17 @@ EARLY: Range = (0.2, 1.0)
 SHORT: Range = (0.1, 0.4)  # as an ego that keeps its speed could not stop any more
 TIMED: Range = (0.65, 0.75)  # as an ego that reacts at once can just stop
 SOON: Range = (0.1, 0.7)  # of vehicles, that late
+FROM_LEFT: Range = (0.5, 1.0)  # beyond the oncoming lane, where traffic keeps to the right
 ON: Range = (ON_SHARE, 1.0)  # without a stop
 
 # For each manoeuvre the ranges of some coordinates of ``walks.Walks`` and ``drives.Drives``.
 WALKS: Mapping[str, Mapping[str, Range]] = {
     "crosses in time": {
         "zone": TIMED, "speed": (0.95, 1.0), "heading": STRAIGHT, "depth": THROUGH,
+    },
+    "comes from afar and stops in the way": {
+        "place": FROM_LEFT, "zone": (0.08, 0.26), "speed": (0.75, 1.0), "heading": (0.1, 0.55),
+        "depth": (0.62, 0.97),
     },
     "crosses": {"zone": LATE, "speed": (0.5, 1.0), "heading": STRAIGHT, "depth": THROUGH},
     "crosses slowly": {"zone": LATE, "speed": (0.0, 0.35), "heading": STRAIGHT, "depth": THROUGH},
@@ -95,66 +103,99 @@ PAIRS: Mapping[str, Sequence[tuple[Mapping[str, Range], Mapping[str, Range]]]] =
     ),
 }
 
-ROUNDS = 2  # of all manoeuvres in turn
 ANY = 0.25  # how often the next one in turn comes all the same
-PRIOR = 0.2  # value of a manoeuvre of which nothing is known
+# An ego that decides only now and then seldom reacts before a body is in its way, which is unfair
+# if it can then not stop: the least share of "zone" against it, by the name of the movements.
+LEAST_ZONE = {"walks": 0.3}
+PRIOR, LEAST = 0.4, 0.05  # value of a manoeuvre of which nothing is known, and the least
+TRIES = 8  # draws of a point, of which the one that promises most is played
+TYPICAL_S = 20.0  # a manoeuvre of which nothing is known takes so long
+
+Ranges = Mapping[str, Range]
 
 
 @dataclass
 class ManoeuvreSearch:
     """Each point a known manoeuvre, of each body at a place of its own, or a pair of two.
 
-    First each in turn; then those more often that came nearer to a preventable failure.
+    First each in turn; then those more often that come near preventable failures in a short time.
     """
 
     space: Space
     rng: np.random.Generator
     uniform: bool = False
     _turn: int = 0
-    _drawn_as: dict[bytes, tuple[str, int]] = field(default_factory=dict)
-    _values: dict[tuple[str, int], list[float]] = field(default_factory=dict)
+    _drawn_as: dict[bytes, int] = field(default_factory=dict)
+    _worth: dict[int, tuple[float, float]] = field(default_factory=dict)
+
+    @cached_property
+    def expected(self) -> Expected:
+        """The results that are expected of points."""
+        return Expected(self.space)
+
+    @cached_property
+    def sorts(self) -> Sequence[Sequence[Ranges]]:
+        """The manoeuvres of the bodies, for each sort of point: first the same of all, then pairs.
+
+        Further bodies than a pair has do one manoeuvre after the other.
+        """
+        name, bodies = self.space.movements.name, self.space.bodies
+        known = list(MANOEUVRES[name].values())
+        same: list[Sequence[Ranges]] = [(one, *[{**APART, **one}] * (bodies - 1)) for one in known]
+        pairs = PAIRS[name] if bodies > 1 else ()
+        return [
+            *same,
+            *(
+                (*two, *({**APART, **known[i % len(known)]} for i in range(2, bodies)))
+                for two in pairs
+            ),
+        ]
 
     def ask(self) -> list[Point]:
-        return [self._drawn() for _ in range(GENERATION)]
+        return [self._next() for _ in range(GENERATION)]
 
     def tell(self, points: Sequence[Point], told: Sequence[PlayedPoint]) -> None:
+        self.expected.tell(points, told)
         for point, result in zip(points, told, strict=True):
-            known = self._drawn_as.get(point.tobytes())
-            if known is not None:
-                self._values.setdefault(known, []).append(_value(result))
+            sort = self._drawn_as.pop(point.tobytes(), None)
+            if sort is not None:
+                value, took = self._worth.get(sort, (0.0, 0.0))
+                self._worth[sort] = value + value_of(result), took + result.seconds / TYPICAL_S
 
-    def _drawn(self) -> Point:
+    def most_promising(self, draw: Callable[[], Point]) -> Point:
+        """The one of several points that promises most."""
+        return max((draw() for _ in range(TRIES)), key=self.expected.value)
+
+    def _next(self) -> Point:
         """A point of the next manoeuvre."""
-        name, bodies = self.space.movements.name, self.space.bodies
-        known, turn = list(MANOEUVRES[name].values()), self._turn
-        if turn % 2 and bodies > 1:
-            number = self._next("pair", len(PAIRS[name]), turn // 2)
-            chosen = [
-                *PAIRS[name][number],
-                *(known[(turn + i) % len(known)] for i in range(2, bodies)),
-            ]
-            drawn_as = "pair", number
-        else:
-            number = self._next("single", len(known), turn // 2 if bodies > 1 else turn)
-            chosen = [known[number], *[{**APART, **known[number]}] * (bodies - 1)]
-            drawn_as = "single", number
-        point = self.rng.random(self.space.dimension)
-        for i, ranges in enumerate(chosen):
-            for coordinate, (low, high) in ranges.items():
-                point[self.space.index(i, coordinate)] = self.rng.uniform(low, high)
-        self._drawn_as[point.tobytes()] = drawn_as
+        sort = self._sort()
+        point = self.most_promising(lambda: self._drawn(self.sorts[sort]))
+        self._drawn_as[point.tobytes()] = sort
         self._turn += 1
         return point
 
-    def _next(self, sort: str, count: int, turn: int) -> int:
-        """Which of the manoeuvres of a sort comes next."""
-        if turn < ROUNDS * count or self.rng.random() < ANY:
-            return turn % count
-        told = [self._values.get((sort, i), []) for i in range(count)]
-        worth = np.array([(sum(values) + PRIOR) / (len(values) + 1.0) for values in told]) ** 2
+    def _drawn(self, manoeuvres: Sequence[Ranges]) -> Point:
+        """A point whose bodies do these manoeuvres."""
+        point = self.rng.random(self.space.dimension)
+        for i, ranges in enumerate(manoeuvres):
+            for coordinate, wanted in ranges.items():
+                low, high = part(self.space.movements, coordinate, wanted)
+                point[self.space.index(i, coordinate)] = self.rng.uniform(low, high)
+            self._delay(point, i)
+        return point
+
+    def _delay(self, point: Point, body: int) -> None:
+        """Let a body come later against an ego that decides only now and then."""
+        space, zone = self.space, self.space.index(body, "zone")
+        together = body and space.share(point, body, "company") >= TOGETHER
+        if space.every and not together:
+            point[zone] = max(point[zone], LEAST_ZONE.get(space.movements.name, 0.0))
+
+    def _sort(self) -> int:
+        """Which sort of point comes next."""
+        count = len(self.sorts)
+        if self._turn < count or self.rng.random() < ANY:
+            return self._turn % count
+        known = [self._worth.get(i, (0.0, 0.0)) for i in range(count)]
+        worth = np.array([max(LEAST, value + PRIOR) / (took + 1.0) for value, took in known]) ** 2
         return int(self.rng.choice(count, p=worth / worth.sum()))
-
-
-def _value(result: PlayedPoint) -> float:
-    """The value of a point for the choice of manoeuvres: 0 to 1 of a test, 2 of a failure."""
-    return 2.0 if result.failed else min(1.0, max(0.0, (result.grade + 2.0) / 2.0))

@@ -17,10 +17,10 @@ from cavsumo.searchers.protocol import PlayedPoint, PointSpace, RandomSearch, Se
 from cavsumo.searchers.space import Point, Space
 from cavsumo.searchers.tree import TreeSearch
 
-FIRST = 2  # generations of known manoeuvres before the others take part
+FIRST = 3  # generations of known manoeuvres before the others take part
 FORGET = 0.8  # weight of what an earlier generation found
 SHARES = {
-    "manoeuvres": 1.0, "neighbours": 2.5, "cma": 0.3, "random": 0.2, "tree": 0.1, "explore": 0.1,
+    "manoeuvres": 1.0, "neighbours": 1.6, "cma": 0.3, "random": 0.2, "tree": 0.1, "explore": 0.1,
 }  # of the budget, while all find as much  # fmt: skip
 PER_FAILURE = 0.3  # worth of a failure like an earlier one; a new kind counts as one more
 HEIR = "neighbours"  # it goes on from what any member finds, so that is its worth too

@@ -1,4 +1,4 @@
-"""The protocol of searchers, and the simple ones: random points, and neighbours of good ones."""
+"""The protocol of searchers, and the simplest one: random points."""
 
 from __future__ import annotations
 
@@ -15,6 +15,7 @@ from cavsumo.searchers.space import Point, Space
 
 GENERATION = 10  # points that are chosen together, before any of them is played
 LOWEST_GRADE = -5.0  # of an invalid episode (``results.grade``); from 0 on are preventable failures
+UNFAIR = (-3.0, -2.0)  # grades of unfair episodes, without the second
 
 
 class PlayedPoint(NamedTuple):
@@ -25,12 +26,21 @@ class PlayedPoint(NamedTuple):
         failed: whether it is a preventable failure.
         kind: of the failure; failures of one kind are alike.
         situations: in which the decisions were taken, of a point of ``DecisionSpace``.
+        body: the number of the body that the verdict names; None for none.
+        seconds: for how long it was played, in simulated time [s].
     """
 
     grade: float
     failed: bool
     kind: tuple[object, ...] = ()
     situations: tuple[Situation, ...] = ()
+    body: int | None = None
+    seconds: float = 0.0
+
+    @property
+    def spoilt(self) -> bool:
+        """Whether it was unfair or invalid: no test of the ego."""
+        return self.grade <= LOWEST_GRADE or UNFAIR[0] <= self.grade < UNFAIR[1]
 
 
 class PointSpace(Protocol):

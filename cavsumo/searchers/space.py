@@ -136,6 +136,17 @@ class Space:
         """One number of a point."""
         return float(point[self.index(body, name)])
 
+    def shares(self, point: Point, body: int) -> dict[str, float]:
+        """The numbers of a body, by their names; the zone of one that acts with the first follows.
+
+        Its place stays relative to that of the first.
+        """
+        found = {name: self.share(point, body, name) for name in self.movements.meanings}
+        if body and self.share(point, body, "company") >= TOGETHER:
+            moment = self.share(point, 0, "zone") + MOMENTS * (found["zone"] - 0.5)
+            found["zone"] = min(1.0, max(0.0, moment))
+        return found
+
     def manner(self, point: Point, body: int = 0) -> tuple[int, ...]:
         """The manner of moving of a body, as thirds of the numbers that tell manners apart."""
         names = self.movements.manner
@@ -176,7 +187,7 @@ class Space:
 
     def _first(self, point: Point) -> tuple[Place, Programme]:
         """The place and the programme of the first body."""
-        shares = self._shares(point, 0)
+        shares = self.shares(point, 0)
         place, programme = self._free(shares, self.movements.suited(shares), [])
         if not self.every:
             return place, programme
@@ -187,11 +198,8 @@ class Space:
         self, point: Point, body: int, taken: Sequence[Place]
     ) -> tuple[Place, Programme | None]:
         """The place and the programme of a further body."""
-        shares, company = self._shares(point, body), self.share(point, body, "company")
-        reaction, zone = self.share(point, body, "reaction"), shares["zone"]
-        if company >= TOGETHER:
-            moment = self.share(point, 0, "zone") + MOMENTS * (zone - 0.5)
-            shares["zone"] = min(1.0, max(0.0, moment))
+        shares, company = self.shares(point, body), self.share(point, body, "company")
+        reaction, zone = self.share(point, body, "reaction"), self.share(point, body, "zone")
         places: Sequence[Place] = self.movements.suited(shares)
         if company >= TOGETHER:
             places = _near(taken[0], shares["place"], self.movements.places)
@@ -201,10 +209,6 @@ class Space:
             cue = BRAKES if reaction < AS_IT_SPEEDS_UP else SPEEDS_UP
             programme = programme._replace(cue=cue, delay=zone * LONGEST_DELAY_S)
         return place, programme if company >= ALONE else None
-
-    def _shares(self, point: Point, body: int) -> dict[str, float]:
-        """The numbers of a body, by their names."""
-        return {name: self.share(point, body, name) for name in self.movements.meanings}
 
     def _free(
         self, shares: Mapping[str, float], wanted: Sequence[Place], taken: Sequence[Place]

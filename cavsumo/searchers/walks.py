@@ -5,7 +5,12 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
+from itertools import compress
 from typing import ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
 
 from cavsumo.agents.cues import zone_m
 from cavsumo.agents.programme import WalkProgramme, entry_of
@@ -29,6 +34,8 @@ OBLIQUE_RAD = math.radians(60.0)  # of the first leg, to either side
 ZONES = (-0.8, 1.6)  # where an ego that does not react would be as a body comes into its way
 DEPTHS_M = (-1.5, 3.0)
 LONGEST_M = 5.0  # of the second leg
+
+Numbers = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -75,19 +82,32 @@ class Walks:
         The ego is expected to drive at the limit.
         """
         walk = walk_of(shares, self.kind)
-        return tuple(p for p in self.places if self._in_time(walk, p)) or self.places
+        return self.in_time(walk) or self.places
+
+    def in_time(self, walk: WalkProgramme) -> tuple[Place, ...]:
+        """The places where the ego is still to come when a body has to step off for a programme."""
+        if isinstance(walk.cue, str):
+            return self.places
+        along, limit, aways, which = self._ways
+        entered = np.array([entry_of(walk, away, self.kind) for away in aways])[which]
+        zone = np.array([zone_m(walk.cue, v) for v in limit.tolist()])
+        in_time = along + entered[:, 1] >= limit * entered[:, 0] + zone
+        return tuple(compress(self.places, in_time))
 
     def realised(self, place: Place, shares: Mapping[str, float]) -> tuple[Place, WalkProgramme]:
         """The place as it is, and the programme of the numbers."""
         return place, walk_of(shares, self.kind)
 
-    def _in_time(self, walk: WalkProgramme, place: Place) -> bool:
-        """Whether the ego is still to come when a body has to step off for its programme."""
-        if isinstance(walk.cue, str):
-            return True
-        entry, shift = entry_of(walk, place.away, self.kind)
-        v = [0.0, *(one.speed for one in self.limits if one.along <= place.along)][-1]
-        return place.along + shift >= v * entry + zone_m(walk.cue, v)
+    @cached_property
+    def _ways(self) -> tuple[Numbers, Numbers, list[float], NDArray[np.intp]]:
+        """Where each place meets the ego's path [m] and the limit there [m/s]; distances.
+
+        The distances from the ego's strip are few [m]: then which of them is that of each place.
+        """
+        along = np.array([place.along for place in self.places])
+        limits = [[0.0, *(one.speed for one in self.limits if one.along <= at)][-1] for at in along]
+        aways, which = np.unique([round(p.away, 2) for p in self.places], return_inverse=True)
+        return along, np.array(limits), aways.tolist(), which
 
     def fits(self, place: Place, others: Sequence[Place]) -> bool:
         """Whether a body can start at a place, apart from others."""

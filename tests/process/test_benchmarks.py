@@ -6,6 +6,7 @@ import importlib
 import importlib.util
 import json
 import re
+import shutil
 import sys
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -102,12 +103,15 @@ def test_rare_events(play: Play) -> None:
 def test_estimators(play: Play) -> None:
     """Two replications of each method on each function; probabilities are known."""
     _, *found = play("estimators", "--replications", "2", "--episodes", "200").splitlines()
-    assert [row.split()[2] for row in found[:5]] == [
-        "auto", "monte-carlo", "importance", "sobol", "subset",
+    assert [row.split()[2] for row in found[:6]] == [
+        "auto", "monte-carlo", "stratified", "importance", "sobol", "subset",
     ]  # fmt: skip
+    words = "--replications", "2", "--half-width", "5", "--method", "monte-carlo"
+    _, early = play("estimators", *words, "--function", "corners").splitlines()
+    assert float(early.split()[7]) < 2000
     assert {row.split()[0]: row.split()[1] for row in found} == {
         "corner": "1.0e-04", "corners": "1.0e-03", "ball": "1.2e-04", "scattered": "1.0e-03",
-        "pedestrian": found[-1].split()[1],
+        "pedestrian": found[-7].split()[1], "lights": "2.1e-03",
     }  # fmt: skip
 
 
@@ -319,6 +323,35 @@ def test_minimise(play: Play) -> None:
     assert everything.split()[1:] == one.split()[2:]
     assert re.fullmatch(r"by force: 0 of \d+ single reductions of 1 results fail the same", force)
     assert planted.startswith("planted: 5 bodies in ")
+
+
+def test_exports(play: Play) -> None:
+    """A failure, exported and imported again; read by commonroad-io and played, where they are."""
+    words = ["--net", "crossing", "--failures", "1", "--runs", "3"]
+    there = importlib.util.find_spec("commonroad") is not None
+    words += ["--commonroad", sys.executable] if there else []
+    _, one, everything = play("exports", *words, KINDS=("pedestrian",)).splitlines()
+    assert one.split()[2:] == everything.split()[1:]
+    failures, issues, places, far, turned, missing, same, _, read, _, imported = numbers(everything)
+    assert (failures, issues, missing, imported) == (1, 0, 0, 2)
+    assert (far < 0.02, turned < 0.01) == (True, True)
+    assert read == there
+    if shutil.which("esmini"):
+        assert (places > 100, same) == (True, 1)
+
+
+def test_transfer(play: Play) -> None:
+    """One test at one place, in each form."""
+    said = play(
+        "transfer", "--tests", "1", "--runs", "8", "--places", "1", "--seeds", "1",
+        "--net", "crossing",
+    )  # fmt: skip
+    lines = said.splitlines()
+    assert lines[0].startswith("1 minimal tests")
+    assert [line.split("|")[1:3] for line in lines[3::2]] == [
+        [" crossing, in the zone ", " 1 "],
+        [" crossing, in the phase ", " 1 "],
+    ]
 
 
 def test_overlaps(play: Play) -> None:

@@ -155,6 +155,35 @@ def test_beside_other_agents_all_play_equally_often(tmp_path: Path) -> None:
     assert [row["agent"] for row in rows(tmp_path / "both.csv")] == ["exposure", "noop"] * 25
 
 
+VEHICLES = """
+[{kind}.arrivals]
+within_s = 2.0
+[{kind}.attention]
+inattentive = {share}
+"""
+
+
+@pytest.mark.parametrize("kind", ["bicycle", "car"])
+def test_vehicles_meet_the_ego(kind: str, tmp_path: Path, capsys: Capture) -> None:
+    """Those who do not look go at once and are hit; those who look let the ego pass, and replay."""
+    met = {}
+    for share in ("0.0", "1.0"):
+        file, exposure = tmp_path / f"{share}.csv", tmp_path / f"{share}.toml"
+        exposure.write_text(VEHICLES.format(kind=kind, share=share), encoding="utf-8")
+        words = ["estimate", "--net", "crossing", "--routes", "none", "--ego", "constant"]
+        words += ["--kind", kind, "--method", "stratified", "--max-episodes", "12", "-q"]
+        words += ["--half-width", "1e-6", "--exposure", str(exposure), "-o", str(file)]
+        assert main(words) == Exit.OK
+        met[share] = [row["outcome"] for row in rows(file)]
+        assert not {"error", "invalid"} & {*met[share]}
+        assert estimated(file).per_hour == {"bicycle": 30.0, "car": 120.0}[kind]
+    assert "violated" not in met["0.0"]
+    assert "violated" in met["1.0"]
+    run = str(met["1.0"].index("violated"))
+    assert main(["replay", str(tmp_path / "1.0.csv"), run]) == Exit.OK
+    assert "frames: the same" in capsys.readouterr().out
+
+
 @pytest.mark.parametrize(
     ("words", "said"),
     [
@@ -165,7 +194,7 @@ def test_beside_other_agents_all_play_equally_often(tmp_path: Path) -> None:
         (["--agent", "timing"], "--agent: expected none"),
         (["--picture", "a.gif"], "--picture 'a.gif': expected a name that ends in .svg or .png"),
         (["--against", "sumo", "--method", "importance"], "--against: needs --method monte-carlo"),
-        (["--kind", "car"], "agent exposure can only walk"),
+        (["--kind", "bus"], "only pedestrian, bicycle and car have one"),
         (["--max-episodes", "0"], "runs"),
         (["--method", "importance", "--max-episodes", "60"], "at least 100 episodes, got 60"),
     ],

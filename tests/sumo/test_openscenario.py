@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-import importlib.util
 import math
 import shutil
-import sys
 import xml.etree.ElementTree as ET
 from pathlib import Path
 
 import pytest
 from inline import cavsumo as command
+from support import benchmark
 
 from cavsumo.errors import Exit
 from cavsumo.interop.storyboard_parts import held
@@ -21,13 +20,7 @@ from cavsumo.results.traces import Shape, Trace, read_trace
 pytest.importorskip("scenariogeneration", reason="pip install 'cavsumo[export]'")
 ESMINI = shutil.which("esmini")
 CAR = Shape("car", 4.5, 1.75, 3.0)
-SPEC = importlib.util.spec_from_file_location(
-    "benchmark_of_exports", Path(__file__).parents[2] / "benchmarks" / "exports.py"
-)
-assert SPEC is not None
-assert SPEC.loader is not None
-exports = sys.modules[SPEC.name] = importlib.util.module_from_spec(SPEC)
-SPEC.loader.exec_module(exports)
+exports = benchmark("exports")
 
 
 @pytest.fixture(scope="module")

@@ -34,7 +34,7 @@ ROOMS = {
         "probability": "model games network agents searchers",
         "batch": "model suites network agents assertions egos sumo simulation results searchers "
         "probability",
-        "kept": "model network agents assertions results batch",
+        "kept": "model network agents assertions egos results searchers batch",
         "report": "model suites network assertions egos results probability batch kept",
         "interop": "model network sumo results",
         "api": "model suites network agents openscenario batch kept report results",

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from cavsumo.errors import InputError
-from cavsumo.model.bodies import CAR, PEDESTRIAN
+from cavsumo.model.bodies import BICYCLE, BUS, PEDESTRIAN
 from cavsumo.model.scenario import BatchPlan
 from cavsumo.network.site import Site
 from cavsumo.probability.distributions import Exponential, Histogram, LogNormal, Normal
@@ -21,7 +21,9 @@ from cavsumo.probability.methods import ESTIMATORS
 from cavsumo.probability.monte_carlo import exact_estimate, needed_without_failure
 from cavsumo.probability.protocol import ALL_PLAYED, Estimator, Goal, PlayedVector, looks
 from cavsumo.probability.ratio import ratio_of
+from cavsumo.probability.stratified import Cut, Stratified, allocated, bounds, weighted_counts
 from cavsumo.probability.tree import Floats
+from cavsumo.probability.vehicle_encounters import VehicleEncounters
 
 NEVER = 1e-9  # a half-width that is not reached
 
@@ -245,5 +247,68 @@ def test_an_exposure_without_support_is_refused(
     fast = _with(speed_mps={"distribution": "normal", "mean": 9.0, "sd": 0.1})
     with pytest.raises(InputError, match=r"speed_mps: .* between 0.3 and 1.4, the speeds of a ped"):
         encounters_of(site, PEDESTRIAN, ((0,),), fast)
-    with pytest.raises(InputError, match="only pedestrians have one"):
-        encounters_of(site, CAR, ((0,),), read_exposure())
+    with pytest.raises(InputError, match="only pedestrian, bicycle and car have one"):
+        encounters_of(site, BUS, ((0,),), read_exposure())
+
+
+def test_strata_are_all_of_the_cube() -> None:
+    """Two cuts give four strata; half of all vectors is spread over them alike."""
+    low, high = bounds(3, (Cut(0, 0.1), Cut(2, 0.4), Cut(1, 0.0)))
+    weights = (high - low).prod(1)
+    assert sorted(weights) == pytest.approx([0.04, 0.06, 0.36, 0.54])
+    counts = allocated(weights, 1000)
+    assert counts.sum() == 1000
+    assert min(counts) == 125 + 20
+    assert max(counts) == 1000 - 145 - 155 - 305
+
+
+def test_one_stratum_has_the_exact_interval_of_a_count() -> None:
+    """Garwood's for 0 and 3 failures of 1000: at most 3.689, and 0.619 to 8.767."""
+    one, three = (
+        weighted_counts(np.array([n]), np.array([1e-3]), 0.05, 0.95, 1000) for n in (0, 3)
+    )
+    assert (one.lower, one.upper) == (0.0, pytest.approx(3.6889e-3, rel=1e-4))
+    assert three.lower == pytest.approx(0.61867e-3, rel=1e-4)
+    assert three.upper == pytest.approx(8.7673e-3, rel=1e-4)
+
+
+def test_strata_find_failures_of_a_rare_kind() -> None:
+    """Failures of one in a hundred: 200 intervals cover, with less spread than by chance."""
+    cuts, truth, found = (Cut(0, 0.1), Cut(1, 0.1)), 0.002, []
+    for seed in range(200):
+        one = Stratified(3, Goal(1000, NEVER), np.random.default_rng(seed), cuts)
+        played(one, lambda u: np.where(u[:, :2].max(1) < 0.1, 0.2 - u[:, 2], -1.0))
+        found.append(one)
+    last = [one.history[-1] for one in found]
+    assert np.mean([one.p for one in last]) == pytest.approx(truth, rel=0.05)
+    assert sum(one.lower <= truth <= one.upper for one in last) >= 190
+    assert np.var([one.p for one in last]) < truth / 1000 / 4
+    assert np.median([one.gain()[0] for one in found]) > 4.0
+    assert last[0].episodes == 1000
+
+
+def test_vehicles_come_as_an_exposure_says(
+    staged: Callable[..., tuple[BatchPlan, Site]],
+) -> None:
+    """Bicycles: shares, speeds, and starts on ways that cross the ego's; early ones are nearer."""
+    site = staged("crossing", kind="bicycle")[1]
+    found = encounters_of(site, BICYCLE, ((0,),), read_exposure())
+    assert isinstance(found, VehicleEncounters)
+    assert found.names == ("approach", "arrival", "speed", "gap", "attention")
+    assert found.per_hour == 30.0
+    assert found.cuts == (Cut(4, 0.02),)
+    drawn = np.random.default_rng(1).random((2000, found.dimension))
+    memories = [found.memories(u)[0] for u in drawn]
+    drivers = [one["drivers"][0] for one in memories]
+    assert np.mean([one["looks"] for one in drivers]) == pytest.approx(0.98, abs=0.01)
+    assert np.mean([one["critical_gap_s"] for one in drivers]) == pytest.approx(6.5, abs=0.15)
+    assert max(one["programme"][1] for one in drivers) == BICYCLE.v_max
+    assert max(one["arrival_s"] for one in drivers) <= 12.0
+    assert {one["starts"][0][4] for one in memories} == {
+        i for i, way in enumerate(site.approaches) if math.isfinite(way.wait)
+    }
+    low, high = (np.full(found.dimension, 0.5) for _ in range(2))
+    low[:2], high[:2] = (0.0, 0.1), (0.0, 0.9)
+    first, last = (found.memories(u)[0]["starts"][0] for u in (low, high))
+    path, place = site.approaches[first[4]].path, lambda start: (start[0], start[1])
+    assert path.project(*place(first)).along < path.project(*place(last)).along

@@ -13,7 +13,7 @@ from cavsumo.errors import InputError
 from cavsumo.model.bodies import CAR, PEDESTRIAN
 from cavsumo.model.scenario import BatchPlan
 from cavsumo.network.site import Site
-from cavsumo.searchers.bounds import bounded
+from cavsumo.searchers.bounds import bounded, part
 from cavsumo.searchers.methods import SEARCHERS, check_method, searcher_of
 from cavsumo.searchers.portfolio import Portfolio
 from cavsumo.searchers.protocol import PlayedPoint
@@ -65,6 +65,15 @@ def test_one_value_is_a_range(space: Space) -> None:
     points = np.random.default_rng(2).random((20, inside.dimension))
     speeds = [one.speed for p in points for _, one in inside.played(p) if one is not None]
     assert speeds == pytest.approx([0.4] * len(speeds))
+
+
+def test_manoeuvres_keep_their_ranges(space: Space) -> None:
+    """The part of them that is inside; the nearest end where none is."""
+    inside = bounded(space, "speed=0.575:0.85")  # shares 0.25 to 0.5
+    assert part(inside.movements, "speed", (0.0, 0.35)) == pytest.approx((0.0, 0.4))
+    assert part(inside.movements, "speed", (0.5, 1.0)) == pytest.approx((1.0, 1.0))
+    assert part(inside.movements, "zone", (0.15, 0.5)) == (0.15, 0.5)
+    assert part(space.movements, "speed", (0.0, 0.35)) == (0.0, 0.35)
 
 
 def test_decisions_know_places_alone(space: Space) -> None:

@@ -29,7 +29,7 @@ def export(wanted: KeepOptions) -> int:
     with SlowSteps() as steps:
         steps.begin(f"exporting run {record.run}")
         route = shown_site(record.plan, record.trace).route
-        place = ExportPlace(scenario.net_file, route.path, scenario.end)
+        place = ExportPlace(scenario.net_file, route.path, route.edges, scenario.end)
         names = _written(record.trace, place, wanted.output, wanted)
     say_written([wanted.output / name for name in names])
     return Exit.OK

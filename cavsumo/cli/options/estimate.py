@@ -28,8 +28,9 @@ def add_estimate(commands: Any) -> None:
     estimate = commands.add_parser(
         "estimate",
         help="estimate how often an ego fails preventably",
-        description="Estimate how often an ego fails preventably when pedestrians do what an "
-        f"exposure says. All options of run, with other defaults: agent {EXPOSURE}, one tester.",
+        description="Estimate how often an ego fails preventably when pedestrians, cyclists or "
+        "drivers (--kind) do what an exposure says. All options of run, with other defaults: agent "
+        f"{EXPOSURE}, one tester.",
         allow_abbrev=False,
     )
     estimate.fill = _fill
@@ -39,7 +40,7 @@ def add_estimate(commands: Any) -> None:
 def _fill(estimate: argparse.ArgumentParser) -> None:
     """Add the options."""
     add = estimate.add_argument
-    add("--exposure", metavar="FILE", help="what pedestrians do by chance (TOML)")
+    add("--exposure", metavar="FILE", help="what people do by chance (TOML)")
     add(
         "--method", choices=ESTIMATE_METHODS, metavar="NAME",
         help=f"estimator: {', '.join(ESTIMATE_METHODS)} (default {ESTIMATE_METHODS[0]})",

@@ -58,8 +58,8 @@ def add_export(commands: Any) -> None:
         "export",
         help="write a recorded episode in a format of others",
         description="Write a recorded episode in a format of others. openscenario: test.xosc "
-        "(OpenSCENARIO XML 1.2), in which everybody follows the recorded track, and test.xodr "
-        "(OpenDRIVE) with the roads.",
+        "(OpenSCENARIO XML 1.2) and test.xodr (OpenDRIVE 1.7) with the roads; commonroad: test.xml "
+        "(CommonRoad 2020a) with lanelets, obstacles and the ego's planning problem.",
         allow_abbrev=False,
     )
     _add_episode(export)
