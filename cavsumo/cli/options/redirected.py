@@ -10,9 +10,12 @@ import os
 import sys
 from collections.abc import Sequence
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from cavsumo.errors import InputError
-from cavsumo.model.study import Part
+
+if TYPE_CHECKING:
+    from cavsumo.model.study import Part
 
 
 def taken_by_output(output: Path, parts: Sequence[Part]) -> Path | None:

@@ -17,7 +17,7 @@ def add_transfer(commands: Any) -> None:
         help="try kept tests on other networks",
         description="Try failures on other networks: each in coordinates relative to the ego's "
         "path, at the places where it fits, with several seeds. Every episode is a row; the table "
-        "table says for each test at how many places it applies, and how often it fails again.",
+        "says for each test at how many places it applies, and how often it fails again.",
         allow_abbrev=False,
     )
     add = transfer.add_argument
