@@ -12,11 +12,10 @@ from itertools import accumulate, pairwise
 from typing import NamedTuple
 
 from cavsumo.model.bodies import BICYCLE, BUS, PEDESTRIAN
-from cavsumo.results.traces import Shape, Trace, states
+from cavsumo.results.traces import Shape, Trace, last_stood, states
 
 HEIGHT_M = {PEDESTRIAN.name: 1.7, BICYCLE.name: 1.7, BUS.name: 3.2}
 CAR_HEIGHT_M = 1.5
-STOOD_MPS = 1e-3  # slower than this a body stands
 
 
 class TrackPoint(NamedTuple):
@@ -109,5 +108,4 @@ def driven(track: Track) -> list[float]:
 
 def set_off(track: Track) -> int | None:
     """The moment from which on a body does not stand any more; None if it never stood."""
-    stood = [i for i, one in enumerate(track) if one.speed < STOOD_MPS]
-    return stood[-1] if stood else None
+    return last_stood(one.speed for one in track)

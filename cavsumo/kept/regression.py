@@ -27,7 +27,7 @@ from cavsumo.kept.standing import has_reason_to_stand
 from cavsumo.model.polyline import Path as Polyline
 from cavsumo.model.scenario import Params
 from cavsumo.results.rows import Outcome, cell, verdicts_of
-from cavsumo.results.traces import Trace, trace_of
+from cavsumo.results.traces import Trace, last_stood, trace_of
 
 STANDING = "standing"  # the assertion that tells an ego that stops for ever
 FAILS, PASSES, ELSEWHERE = "still fails", "passes now", "no longer meets"
@@ -36,7 +36,6 @@ STATUSES = (FAILS, STANDS, ELSEWHERE, PASSES, ERROR)
 RECORDED, POLICY = "recorded", "policy"  # what the testers follow
 TESTERS = (RECORDED, POLICY)
 STOOD = "stood"  # in the column ``frozen``
-STOOD_MPS = 1e-3  # slower than this a tester stands
 
 
 @dataclass(frozen=True)
@@ -150,8 +149,8 @@ def _holding(recorded: Recorded, trace: Trace, path: Polyline) -> Recorded:
     along = [path.project(frame["ego"][0], frame["ego"][1]).along for frame in frames]
     holds = []
     for name in frames[0]["testers"]:
-        stood = [i for i, f in enumerate(frames) if f["testers"][name][2] < STOOD_MPS]
-        holds.append(Hold(stood[-1], along[stood[-1]]) if stood else None)
+        stood = last_stood(frame["testers"][name][2] for frame in frames)
+        holds.append(None if stood is None else Hold(stood, along[stood]))
     return dataclasses.replace(recorded, holds=holds)
 
 

@@ -37,7 +37,7 @@ from cavsumo.model.kinematics import wrap
 from cavsumo.model.polyline import Path
 from cavsumo.results.rows import is_failure
 from cavsumo.searchers.places import FROM_LEFT, FROM_RIGHT, Place
-from cavsumo.searchers.space import Space, space_of
+from cavsumo.searchers.space import Space
 
 STOOD_MPS = 0.05  # slower than this a body stands
 PAUSE_S = 0.3  # a shorter stop is none
@@ -102,7 +102,7 @@ def relative_test(name: str, record: Record) -> RelativeTest:
         raise InputError(f"{name}: no trace was kept of it")
     body = int(row["tester"].removeprefix("tester"))
     kind = kind_named(scenario.kind)
-    home = _home(record, kind)
+    home = prepare(for_playback(record).plan).space
     programme = _searched(record, body)
     every = home.every
     if programme is not None:
@@ -118,15 +118,6 @@ def relative_test(name: str, record: Record) -> RelativeTest:
     whence = FROM_LEFT if track.left else FROM_RIGHT
     enters = track.enters * scenario.step_length
     return RelativeTest(name, record, kind, walk, whence, enters=enters, every=every)
-
-
-def _home(record: Record, kind: Kind) -> Space:
-    """The space of tests at the place of a record."""
-    plan, ego = for_playback(record).plan, ego_of(record.plan.scenario)
-    prepared = prepare(plan)
-    every = ego.decides_every_s if ego.decides_every_s > plan.scenario.step_length else 0.0
-    speed = plan.scenario.start_speed
-    return space_of(prepared.site, kind, ((0,),), ego=ego.kind, start_speed=speed, every=every)
 
 
 def _searched(record: Record, body: int) -> Programme | None:

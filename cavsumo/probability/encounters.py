@@ -20,7 +20,7 @@ from cavsumo.network.pedestrian_starts import APART_M
 from cavsumo.network.recorded_starts import start_record
 from cavsumo.network.site import Site
 from cavsumo.probability.exposure import Exposure
-from cavsumo.probability.stratified import Cut
+from cavsumo.probability.stratified import Cut, cuts_of
 from cavsumo.probability.tree import Floats
 from cavsumo.probability.vehicle_encounters import KINDS, VehicleEncounters, vehicle_encounters
 from cavsumo.searchers.places import Place
@@ -76,8 +76,7 @@ class Encounters:
             ON_RED: chance.compliance.against_red,
             STOPS[0]: chance.hesitation.share,
         }
-        names = self.names * self.bodies
-        return tuple(Cut(i, shares[name]) for i, name in enumerate(names) if name in shares)
+        return cuts_of(self.names * self.bodies, shares)
 
     def memories(self, vector: Floats) -> tuple[dict[str, Any], ...]:
         """The memories with which the agents of ``agents.exposed`` play a vector."""

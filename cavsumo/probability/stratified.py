@@ -14,7 +14,7 @@ The interval is that of a weighted sum of counts by the gamma distribution, whic
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import product
 from typing import NamedTuple
@@ -33,6 +33,11 @@ class Cut(NamedTuple):
 
     coordinate: int
     share: float
+
+
+def cuts_of(names: Sequence[str], shares: Mapping[str, float]) -> tuple[Cut, ...]:
+    """The cuts of coordinates with names, for some of which behaviour changes at a share."""
+    return tuple(Cut(i, shares[name]) for i, name in enumerate(names) if name in shares)
 
 
 @dataclass

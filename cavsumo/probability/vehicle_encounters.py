@@ -21,7 +21,7 @@ from cavsumo.network.recorded_starts import start_record
 from cavsumo.network.site import Site
 from cavsumo.network.vehicle_starts import APART_M
 from cavsumo.probability.exposure import VehicleExposure
-from cavsumo.probability.stratified import Cut
+from cavsumo.probability.stratified import Cut, cuts_of
 from cavsumo.probability.tree import Floats
 from cavsumo.searchers.places import NEAREST_M
 
@@ -52,9 +52,14 @@ class VehicleEncounters:
     names: tuple[str, ...]
 
     @property
+    def bodies(self) -> int:
+        """The number of bodies."""
+        return sum(map(len, self.teams))
+
+    @property
     def dimension(self) -> int:
         """How many numbers a vector has."""
-        return sum(map(len, self.teams)) * len(self.names)
+        return self.bodies * len(self.names)
 
     @property
     def per_hour(self) -> float:
@@ -68,11 +73,7 @@ class VehicleEncounters:
             "attention": self.exposure.attention.inattentive,
             ON_RED: self.exposure.compliance.against_red,
         }
-        return tuple(
-            Cut(i, shares[self.names[i % len(self.names)]])
-            for i in range(self.dimension)
-            if self.names[i % len(self.names)] in shares
-        )
+        return cuts_of(self.names * self.bodies, shares)
 
     def memories(self, vector: Floats) -> tuple[dict[str, Any], ...]:
         """The memories with which the agents of ``agents.exposed`` play a vector."""
@@ -121,7 +122,7 @@ class VehicleEncounters:
             start = Start(x, y, o, approach=approach, v=0.0)
             if all(gap(self._box(start, self.kind), other) > APART_M for other in others):
                 return start
-        raise NetworkError(f"no room for {sum(map(len, self.teams))} vehicles: use fewer")
+        raise NetworkError(f"no room for {self.bodies} vehicles: use fewer")
 
     def _arrival(self, drawn: dict[str, float]) -> float:
         """Time that the ego has left at the arrival of a body [s]."""

@@ -41,6 +41,7 @@ NOT_REPLAYED = ("wall_s", "trace")
 # the memory in the head.
 MANNER = EXTENT | {"shard", "trace", "known"}
 MEMORY_MOST = 100_000  # characters of what an agent knew; one that knew more is not kept
+STOOD_MPS = 1e-3  # slower than this a body stands
 
 
 class Shape(NamedTuple):
@@ -150,6 +151,12 @@ def states(frame: Mapping[str, Any]) -> Iterator[tuple[str, str, list[float]]]:
     for part, key in (("tester", "testers"), ("background", "background")):
         for name, state in frame[key].items():
             yield part, name, state
+
+
+def last_stood(speeds: Iterable[float]) -> int | None:
+    """The last of some moments at which a body stood, by its speeds [m/s]; None if it never did."""
+    stood = [i for i, speed in enumerate(speeds) if speed < STOOD_MPS]
+    return stood[-1] if stood else None
 
 
 def trace_text(head: Mapping[str, Any], frames: str) -> str:

@@ -16,17 +16,18 @@ from typing import Any
 from cavsumo.agents.searched import Programme
 from cavsumo.errors import InputError, UnknownName
 from cavsumo.model.bodies import Kind
-from cavsumo.searchers.places import Place
+from cavsumo.searchers.drives import AHEAD, BEHIND, BESIDE, ONCOMING
+from cavsumo.searchers.places import FROM_LEFT, FROM_RIGHT, Place
 from cavsumo.searchers.space import Movements, Space
 
 SIDE, MEETS = "side", "meets"  # keys that choose places, not numbers
 SIDES = {  # by the words of ``Place.whence``
-    "left": "from the left",
-    "right": "from the right",
-    "ahead": "ahead of the ego",
-    "beside": "from the lane beside",
-    "oncoming": "oncoming",
-    "behind": "from behind",
+    "left": FROM_LEFT,
+    "right": FROM_RIGHT,
+    "ahead": AHEAD,
+    "beside": BESIDE,
+    "oncoming": ONCOMING,
+    "behind": BEHIND,
 }
 WHOLE = (0.0, 1.0)
 NAME = "search.within"

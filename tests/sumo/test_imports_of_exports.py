@@ -8,11 +8,11 @@ import xml.etree.ElementTree as ET
 from pathlib import Path
 
 import pytest
+from exporting import export_as_test, export_failure
 from inline import cavsumo as command
 from support import benchmark
 
 from cavsumo.errors import Exit
-from cavsumo.results.reading import read_rows
 from cavsumo.results.traces import Trace, read_trace
 
 pytest.importorskip("scenariogeneration", reason="pip install 'cavsumo[export]'")
@@ -26,11 +26,7 @@ def exported(
 ) -> tuple[Path, Trace]:
     """A folder with a failure in both formats, and its trace."""
     folder = tmp_path_factory.mktemp("exported")
-    row = next(row for row in read_rows(found_failure) if row["outcome"] == "violated")
-    for to in FILES:
-        done = command(folder, "export", str(found_failure), row["run"], "--to", to, "-o", ".")
-        assert done.returncode == 0, done.stderr
-    return folder, read_trace(found_failure.parent / row["trace"])
+    return folder, export_failure(folder, found_failure, FILES)
 
 
 @pytest.mark.parametrize("name", FILES.values())
@@ -119,9 +115,7 @@ def test_as_a_test_the_ego_is_no_obstacle(
 ) -> None:
     """It is the planner's; such a file cannot be imported, for the ego has no track."""
     _, trace = exported
-    words = [str(found_failure), trace.row["run"], "--to", "commonroad", "--as", "test"]
-    assert command(tmp_path, "export", *words, "-o", ".").returncode == 0
-    root = ET.parse(tmp_path / "test.xml").getroot()
+    root = export_as_test(tmp_path, found_failure, trace, "commonroad", "test.xml")
     bodies = len(trace.shapes())
     assert len(root.findall("dynamicObstacle")) == bodies - 1
     done = command(tmp_path, "import", "test.xml", "-o", "again.jsonl.gz")

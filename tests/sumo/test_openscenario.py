@@ -8,14 +8,14 @@ import xml.etree.ElementTree as ET
 from pathlib import Path
 
 import pytest
+from exporting import export_as_test, export_failure
 from inline import cavsumo as command
 from support import benchmark
 
 from cavsumo.errors import Exit
 from cavsumo.interop.storyboard_parts import held
 from cavsumo.interop.tracks import TrackPoint, at_axle, axle, driven, stays
-from cavsumo.results.reading import read_rows
-from cavsumo.results.traces import Shape, Trace, read_trace
+from cavsumo.results.traces import Shape, Trace
 
 pytest.importorskip("scenariogeneration", reason="pip install 'cavsumo[export]'")
 ESMINI = shutil.which("esmini")
@@ -29,11 +29,7 @@ def exported(
 ) -> tuple[Path, Trace]:
     """A folder with a failure as OpenSCENARIO, and its trace."""
     folder = tmp_path_factory.mktemp("exported")
-    row = next(row for row in read_rows(found_failure) if row["outcome"] == "violated")
-    words = [str(found_failure), row["run"], "--to", "openscenario", "-o", "."]
-    done = command(folder, "export", *words)
-    assert done.returncode == 0, done.stderr
-    return folder, read_trace(found_failure.parent / row["trace"])
+    return folder, export_failure(folder, found_failure, ["openscenario"])
 
 
 def test_the_reference_point_is_on_the_rear_axle() -> None:
@@ -103,9 +99,7 @@ def test_as_a_test_the_ego_is_left_to_the_player(
 ) -> None:
     """It has a speed and a route; testers wait until it has come as far as it had."""
     _, trace = exported
-    words = [str(found_failure), trace.row["run"], "--to", "openscenario", "--as", "test"]
-    assert command(tmp_path, "export", *words, "-o", ".").returncode == 0
-    root = ET.parse(tmp_path / "test.xosc").getroot()
+    root = export_as_test(tmp_path, found_failure, trace, "openscenario", "test.xosc")
     groups = {
         next(one.iter("EntityRef")).get("entityRef"): one for one in root.iter("ManeuverGroup")
     }
