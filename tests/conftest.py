@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from hypothesis import settings
 from inline import played_here
 from shapely.geometry import LineString, box
 from sites import derived_once
@@ -36,6 +37,9 @@ from cavsumo.network.osm.netconvert import sumo_home
 from cavsumo.network.site import Site
 from cavsumo.results.traces import Trace, trace_of
 from cavsumo.sumo.world import World
+
+settings.register_profile("untimed", deadline=None)  # a busy machine makes any example slow
+settings.load_profile("untimed")
 
 NAMES = ("crossing", "junction", "pedestrians")
 

@@ -75,9 +75,11 @@ def test_every_benchmark_is_played_here() -> None:
     assert scripts == set(re.findall(r'play\(\s*"(\w+)"', here))
 
 
-def test_early_end(play: Play) -> None:
+@pytest.mark.parametrize("agent", ["search", "exposure"])
+def test_early_end(play: Play, agent: str) -> None:
     """The same is learned of every point, in less time."""
-    found = play("early_end", "--net", NET, "--ego", "constant", "--runs", "30").splitlines()[1]
+    words = "--net", NET, "--ego", "constant", "--runs", "30", "--agent", agent
+    found = play("early_end", *words).splitlines()[1]
     runs, cut, differ, whole, shorter = numbers(found)[:5]
     assert (runs, differ) == (30, 0)
     assert cut > 0
