@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 import importlib
 import math
+import os
 import re
 import subprocess
 import sys
@@ -12,8 +13,8 @@ from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
+import hypothesis
 import pytest
-from hypothesis import settings
 from inline import played_here
 from shapely.geometry import LineString, box
 from sites import derived_once
@@ -38,9 +39,6 @@ from cavsumo.network.site import Site
 from cavsumo.results.traces import Trace, trace_of
 from cavsumo.sumo.world import World
 
-settings.register_profile("untimed", deadline=None)  # a busy machine makes any example slow
-settings.load_profile("untimed")
-
 NAMES = ("crossing", "junction", "pedestrians")
 
 # The straight road of networks/pedestrians.net.xml, in metres.
@@ -48,6 +46,22 @@ ROAD_LENGTH, ROAD_WIDTH, LANE_Y, PAVEMENT_Y = 99.0, 7.3, 1.825, 5.15
 
 Pose = tuple[float, float, float]  # x, y [m], o [rad]
 State = tuple[float, float, float, float]  # x, y [m], v [m/s], o [rad]
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    """Examples have no deadline, and modules are compiled once for all processes of the tests.
+
+    Where Python is told to write no bytecode, each of some hundred processes would compile all
+    that it imports; it is kept in the cache of pytest then. Processes that play tests come later.
+    """
+    hypothesis.settings.register_profile("untimed", deadline=None)
+    hypothesis.settings.load_profile("untimed")
+    cache = getattr(config, "cache", None)  # -p no:cacheprovider
+    if sys.dont_write_bytecode and cache is not None:
+        folder = str(cache.mkdir("bytecode"))
+        os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
+        os.environ["PYTHONPYCACHEPREFIX"] = sys.pycache_prefix = folder
+        sys.dont_write_bytecode = False
 
 
 @pytest.fixture(scope="session", autouse=True)
