@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import json
+from pathlib import Path
+
 import pytest
 from scripts_played import Play, numbers
 from support import ROOT
@@ -32,15 +35,24 @@ def test_estimators(play: Play) -> None:
     }  # fmt: skip
 
 
-def test_estimates(play: Play) -> None:
-    """A truth, and two estimates of few episodes by each method."""
+def test_estimates(play: Play, tmp_path: Path) -> None:
+    """A truth, and two estimates of few episodes by each method; those that are kept are read."""
+    file = tmp_path / "estimates.jsonl"
     words = "--net", "pedestrians", "--ego", "constant", "--truth", "20"
     words += "--replications", "2", "--episodes", "20"
-    words += "--method", "auto", "--method", "monte-carlo"
+    words += "--method", "auto", "--method", "monte-carlo", "--estimates", str(file)
     truth, _, *methods = play("estimates", *words).splitlines()
     assert truth.startswith("truth: ")
     assert " in 20 episodes of " in truth
     assert [row.split()[0] for row in methods] == ["auto", "monte-carlo"]
+    kept = [json.loads(line) for line in file.read_text("utf-8").splitlines()]
+    assert [one["key"]["seed"] for one in kept] == [1001, 1002, 1001, 1002]
+    kept[0]["found"]["looks"][-1]["p"] = 2.0
+    file.write_text("".join(f"{json.dumps(one)}\n" for one in kept), "utf-8")
+    again = play("estimates", *words).splitlines()
+    assert again[3] == methods[1]
+    assert again[2] != methods[0]
+    assert len(file.read_text("utf-8").splitlines()) == 4
 
 
 def test_estimates_beside_a_kept_truth(play: Play) -> None:

@@ -15,9 +15,11 @@ pytestmark = pytest.mark.usefixtures("inline")
 NET = str(ROOT / "networks" / "pedestrians.net.xml")
 
 
-def test_early_end(play: Play) -> None:
+@pytest.mark.parametrize("agent", ["search", "exposure"])
+def test_early_end(play: Play, agent: str) -> None:
     """The same is learned of every point, in less time."""
-    found = play("early_end", "--net", NET, "--ego", "constant", "--runs", "30").splitlines()[1]
+    words = "--net", NET, "--ego", "constant", "--runs", "30", "--agent", agent
+    found = play("early_end", *words).splitlines()[1]
     runs, cut, differ, whole, shorter = numbers(found)[:5]
     assert (runs, differ) == (30, 0)
     assert cut > 0
@@ -99,7 +101,7 @@ def test_minimise(play: Play) -> None:
     """A failure at the crossing, by force too, and with planted bodies."""
     said = play(
         "minimise", "--failures", "1", "--runs", "20", "--force", "1", "--planted", "1",
-        "--setting", "crossing, pedestrians", PLANTED=5,
+        "--net", "crossing", "--kind", "pedestrians", PLANTED=5,
     )  # fmt: skip
     _, one, everything, force, planted = said.splitlines()
     assert one.split()[2:7] == ["1", "1", "1", "1", "1"]
