@@ -49,14 +49,16 @@ State = tuple[float, float, float, float]  # x, y [m], v [m/s], o [rad]
 
 
 def pytest_configure(config: pytest.Config) -> None:
-    """Examples have no deadline, and modules are compiled once for all processes of the tests.
+    """Set what the tests and all their processes have in common.
 
-    Where Python is told to write no bytecode, each of some hundred processes would compile all
-    that it imports; it is kept in the cache of pytest then. Processes that play tests come later.
+    Examples of hypothesis have no deadline. Each process computes in one thread: there are enough
+    processes. Where Python is told to write no bytecode, each of some hundred processes would
+    compile all that it imports; it is kept in the cache of pytest then.
     """
     hypothesis.settings.register_profile("untimed", deadline=None)
     hypothesis.settings.load_profile("untimed")
-    cache = getattr(config, "cache", None)  # -p no:cacheprovider
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+    cache = getattr(config, "cache", None)  # None with -p no:cacheprovider
     if sys.dont_write_bytecode and cache is not None:
         folder = str(cache.mkdir("bytecode"))
         os.environ.pop("PYTHONDONTWRITEBYTECODE", None)

@@ -21,7 +21,6 @@ Play = Callable[..., str]
 def scripts(patch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> Iterator[Play]:
     """Call with a benchmark, its words and values of its constants: what it prints."""
     patch.syspath_prepend(str(ROOT / "benchmarks"))
-    patch.setenv("OPENBLAS_NUM_THREADS", "1")
     own = set(ASSERTIONS)
     loaded: list[str] = []
 

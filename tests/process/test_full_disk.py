@@ -104,7 +104,7 @@ def test_a_full_disk_ends_a_run_with_one_sentence(
 ) -> None:
     """Exit 3 and no traceback; with room again --resume gives the rows of an undisturbed run."""
     words = ["run", "-n", str(networks["pedestrians"]), "-r", "none", "--end", "1", "-q"]
-    words += ["--agent", "noop", "--testers", "1", "--runs", "120", "--trace", "none"]
+    words += ["--agent", "noop", "--testers", "1", "--runs", "60", "--trace", "none"]
 
     def limited(limit: int, *more: str) -> subprocess.CompletedProcess[str]:
         line = [sys.executable, "-c", LIMITED, str(limit), *words, *more]
@@ -119,12 +119,12 @@ def test_a_full_disk_ends_a_run_with_one_sentence(
     file = tmp_path / "results.csv"
     assert file.read_bytes().endswith(b"\n")
     kept = read_rows(file)
-    assert 0 < len(kept) < 120
+    assert 0 < len(kept) < 60
     assert read_manifest(file)["status"] == "broken"
     assert limited(10_000_000, "--resume").returncode == 0
     rows = read_rows(file)
     assert rows[: len(kept)] == kept
-    assert [int(row["run"]) for row in rows] == list(range(120))
+    assert [int(row["run"]) for row in rows] == list(range(60))
 
 
 FULL_AT_ONCE = """
