@@ -124,7 +124,7 @@ class StoryRun:
         self._stop_acts(seen.time)
         # An event that ends at once may let another one begin at the same moment.
         for _ in self.board.events:
-            begun = [self._started(i, seen.time) for i in range(len(self.board.events))]
+            begun = [self._started(i, seen) for i in range(len(self.board.events))]
             if not any(begun):
                 break
         if self.board.stops:
@@ -149,9 +149,9 @@ class StoryRun:
 
     # Events
 
-    def _started(self, i: int, time: float) -> bool:
+    def _started(self, i: int, seen: BoardView) -> bool:
         """Begin an event if its triggers hold soon; whether it did."""
-        event = self.board.events[i]
+        event, time = self.board.events[i], seen.time
         if self._begun[i] < math.inf or i in self._stopped:
             return False
         moment = max((self._moment(t, time) for t in event.starts), default=0.0)
@@ -162,6 +162,7 @@ class StoryRun:
             self._end_others(i, event, start)
         for k, action in enumerate(event.actions):
             self._ends[i][k] = self._begin(action, (i, k), max(start, time + self.dt))
+        self._arrive(seen)
         return True
 
     def _moment(self, trigger: StoryTrigger, time: float) -> float:
@@ -242,21 +243,15 @@ class StoryRun:
         needed = action.arrival(gone, v).when(action.own_at_m - gone)
         moment = arrives - needed
         if moment < seen.time + 2 * self.dt:
-            start = max(moment, seen.time + self.dt)
-            motion = action.arrival(body.along(start)[0], v)
-            if moment < seen.time:
-                motion = self._late(body, action, start, arrives)
-            body.change(start, motion)
+            start = max(moment, seen.time + self.dt, self._begun[event])
+            gone, v = body.along(start)
+            motion = action.hurried(gone, v, arrives - start) if moment < start else None
+            if motion is None and start - moment > self.dt:
+                raise AgentError(
+                    f"{body.id} cannot arrive with the ego, which is there in "
+                    f"{arrives - start:.1f} s"
+                )
+            body.change(start, motion or action.arrival(gone, v))
             body.arrival = None
             i, k = self._owner[body.id]
             self._ends[i][k] = max(arrives, start)
-
-    def _late(self, body: StoryBody, action: StoryAction, start: float, arrives: float) -> Motion:
-        """The motion of a body that must hurry to arrive; AgentError if it would be too fast."""
-        gone, v = body.along(start)
-        motion = action.hurried(gone, v, arrives - start)
-        if motion is None:
-            raise AgentError(
-                f"{body.id} cannot arrive with the ego, which is there in {arrives - start:.1f} s"
-            )
-        return motion

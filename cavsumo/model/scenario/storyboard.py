@@ -6,6 +6,7 @@ the coordinates of the network. Bodies are named as in snapshots: ``ego``, ``tes
 
 from __future__ import annotations
 
+import math
 from typing import Annotated, Literal, Self
 
 from pydantic import BaseModel, ConfigDict, Field, model_validator
@@ -137,10 +138,11 @@ class StoryAction(BoardPart):
     def hurried(self, gone: float, v: float, left: float) -> Motion | None:
         """The motion of a body that has less time than ``arrival`` takes; None if it is too little.
 
-        Two even changes of speed of the same duration T / 2 over the distance d before its steady
-        speed: from v to u, and from u to the final speed w, with::
+        It gains speed and loses it again at the same rate a, the least one with which it arrives in
+        time: over the distance d and time T before its steady speed from v to u, and from u to the
+        final speed w, with::
 
-            d = T / 4 (v + 2 u + w)
+            T = (2 u - v - w) / a,    d = (2 u^2 - v^2 - w^2) / (2 a)
 
         ``left``: the time until it arrives [s].
         """
@@ -150,11 +152,12 @@ class StoryAction(BoardPart):
         time = left - self.steady_m / w
         if over <= 0.0 or time <= 0.0:
             return None
-        u = (4.0 * over / time - v - w) / 2.0
-        if not 0.0 <= u <= HURRY * max(v, w):
+        square = over * over - over * time * (v + w) + time * time * (v * v + w * w) / 2.0
+        u = (over + math.sqrt(max(0.0, square))) / time
+        rate = (2.0 * u - v - w) / time
+        if rate <= 0.0 or u > HURRY * max(v, w):
             return None
-        half = time / 2.0
-        return motion_of(v, [Phase((u - v) / half, half), Phase((w - u) / half, half)])
+        return motion_of(v, [to_speed_by(v, u, rate), to_speed_by(u, w, rate)])
 
 
 class StoryEvent(BoardPart):
