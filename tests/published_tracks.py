@@ -9,6 +9,12 @@ from itertools import pairwise
 from pathlib import Path
 from typing import NamedTuple
 
+from cavsumo.agents.rehearsal import STEP_S, view_of
+from cavsumo.agents.storyboard import StoryRun
+from cavsumo.model.scenario.script import ScriptedTest
+from cavsumo.model.snapshot import BodyState
+from cavsumo.openscenario.reading import ReadScenario
+
 DATA = Path(__file__).parent / "data"
 SCENARIOS = DATA / "scenarios"
 WALKER, AHEAD, BICYCLIST = "walker-across.xosc", "ahead.xosc", "bicyclist-across.xosc"
@@ -167,3 +173,16 @@ def _passed(moved: Sequence[tuple[float, float, float]], x: float) -> tuple[floa
             share = (x0 - x) / (x0 - x1)
             return t0 + share * (t1 - t0), v0 + share * (v1 - v0)
     raise AssertionError(f"the target is never at {x} m")
+
+
+def states(made: ReadScenario, until: float = 20.0) -> list[tuple[float, dict[str, BodyState]]]:
+    """All bodies at all timesteps, with an ego that keeps its speed."""
+    script = ScriptedTest.model_validate(made.settings["script"])
+    story, found = StoryRun(script, STEP_S), []
+    for step in range(round(until / STEP_S)):
+        view = view_of(script, story, step * STEP_S)
+        story.advance(view)
+        found.append((view.time, dict(view.states)))
+        if story.stopped:
+            break
+    return found
