@@ -46,6 +46,7 @@ class Recorded:
         departures: of the background; None for the scenario's own demand.
         approaches: types of the site's approaches, among which the starts' places are numbered.
         holds: of each tester, None for one that acts by the clock alone; empty if all do.
+        stops: whether the episode ends with the actions, as that of a script did that stopped it.
     """
 
     seed: int
@@ -55,6 +56,7 @@ class Recorded:
     departures: Demand | None = None
     approaches: Sequence[str] = ()
     holds: Sequence[Hold | None] = ()
+    stops: bool = False
 
     def memories(self, teams: Teams) -> tuple[dict[str, Any], ...]:
         """The knowledge of the agents that play it back, as plain data."""
@@ -64,6 +66,7 @@ class Recorded:
                 "waited": [self.waited[i] for i in team if self.waited],
                 "actions": [[joint[i] for i in team] for joint in self.actions],
                 **({"holds": [self.holds[i] for i in team]} if self.holds else {}),
+                **({"stops": True} if self.stops else {}),
             }
             for team in teams
         )
@@ -92,6 +95,7 @@ class RecordedAgent(Agent):
         self._actions: list[tuple[Action, ...]] = []
         self._done, self.ends = 0, False
         self._holds: list[Hold | None] = []
+        self._stops = False
 
     def reset(self, scene: Scene, owned: Sequence[int], rng: np.random.Generator) -> None:
         super().reset(scene, owned, rng)
@@ -108,6 +112,9 @@ class RecordedAgent(Agent):
 
     def rests(self) -> bool:
         return self.ends and min(self._steps, default=self._done) >= len(self._actions)
+
+    def stops(self) -> bool:
+        return self._stops and self._done == len(self._actions)
 
     def _held(self, i: int, snapshot: Snapshot) -> Action:
         """The action of a body that waits for the ego."""
@@ -127,6 +134,7 @@ class RecordedAgent(Agent):
             "waited": self.recorded_waits,
             "actions": self._actions,
             **({"holds": self._holds} if self._holds else {}),
+            **({"stops": True} if self._stops else {}),
         }
 
     def check_memory(self, memory: Any, bodies: int) -> None:
@@ -144,6 +152,7 @@ class RecordedAgent(Agent):
         )
         self._actions = [tuple(Action(*one) for one in joint) for joint in memory["actions"]]
         self._holds = [hold and Hold(*hold) for hold in memory.get("holds", ())]
+        self._stops = memory.get("stops", False)
 
 
 class RecordedMemory(BaseModel):
@@ -155,6 +164,7 @@ class RecordedMemory(BaseModel):
     waited: list[StartRecord]
     actions: list[list[Action]]
     holds: list[Hold | None] = []
+    stops: bool = False
 
 
 def check_start(start: StartRecord) -> None:

@@ -20,8 +20,9 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from cavsumo.agents.base import AGENTS, Agent
+from cavsumo.agents.story_body import StoryBody
 from cavsumo.agents.story_conditions import BoardView
-from cavsumo.agents.storyboard import StoryBody, StoryRun
+from cavsumo.agents.storyboard import StoryRun
 from cavsumo.errors import AgentError, EgoError
 from cavsumo.model.bodies import Action
 from cavsumo.model.curve import PlaneCurve
@@ -202,10 +203,10 @@ class StoryFollower:
     def action(self, state: BodyState, time: float, front: float, v: float) -> Action:
         """The action of a timestep, whose motion the storyboard has decided."""
         body, dt = self.body, self.dt
-        if body.track is not None and time + 2 * dt > body.since:
+        if time + 2 * dt > body.prescribed:
             return _to_places(state, body.place(time + dt), body.place(time + 2 * dt), dt)
         here, there = (body.along(time + k * dt)[0] for k in (1, 2))
-        return _on_way(body.curve, state, here, there, dt)
+        return _on_way(body.programme.way.curve, state, here, there, dt)
 
 
 def _on_way(curve: PlaneCurve, state: BodyState, here: float, there: float, dt: float) -> Action:

@@ -47,7 +47,7 @@ class BoardState(Protocol):
 
     variables: dict[str, str]
 
-    def state_moment(self, element: str, state: str) -> tuple[float, float]:
+    def state_moment(self, element: str, level: str, state: str) -> tuple[float, float]:
         """From when until when an element is in a state [s]."""
         ...
 
@@ -101,7 +101,7 @@ class ConditionWatch:
         one = self.condition
         if one.sort == "state":
             assert one.state is not None
-            begins, ends = self.told.state_moment(one.element, one.state)
+            begins, ends = self.told.state_moment(one.element, one.level, one.state)
         else:
             begins, ends = self.rose, self.fell
         if one.edge == "none":

@@ -11,76 +11,24 @@ all programmed bodies do: it does not adapt to what the ego does afterwards.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
 from typing import NamedTuple
 
+from cavsumo.agents.story_body import StoryBody
 from cavsumo.agents.story_conditions import BoardView, ConditionWatch
 from cavsumo.errors import AgentError
-from cavsumo.model.curve import PlaneCurve, Pose
+from cavsumo.model.curve import Bend, PlaneCurve
 from cavsumo.model.motion import Motion
-from cavsumo.model.scenario.script import Programme, ScriptedTest
-from cavsumo.model.scenario.storyboard import StoryAction, StoryEvent, StoryTrigger
-from cavsumo.model.scenario.track import Place, ScriptedTrack
+from cavsumo.model.scenario.script import ScriptedTest
+from cavsumo.model.scenario.storyboard import LEVELS, StoryAction, StoryEvent, StoryTrigger
 
 
-class MotionSegment(NamedTuple):
-    """A part of a body's motion: from a moment [s] on, at a distance on its way [m]."""
+class Turning(NamedTuple):
+    """A body that follows another way: the action of an event, and how far it has then gone [m]."""
 
-    begins: float
-    ahead: float
-    motion: Motion
-
-
-@dataclass
-class StoryBody:
-    """A body of a storyboard in one episode: where it is at any time that is decided.
-
-    Attributes:
-        id: of the body.
-        programme: its box, its way and its first speed.
-        segments: of its motion along its way.
-        track: that it follows in place of them, from the moment ``since`` on.
-        arrival: by which it will commit; with the event of which it is.
-    """
-
-    id: str
-    programme: Programme
-    segments: list[MotionSegment] = field(default_factory=list)
-    track: ScriptedTrack | None = None
-    since: float = math.inf
-    arrival: tuple[StoryAction, int] | None = None
-    curve: PlaneCurve = field(init=False)
-
-    def __post_init__(self) -> None:
-        self.curve = self.programme.way.curve
-        self.segments = [MotionSegment(-math.inf, 0.0, Motion(self.programme.speed_mps))]
-
-    def along(self, time: float) -> tuple[float, float]:
-        """Distance on its way [m] and speed [m/s] at a time."""
-        one = next(s for s in reversed(self.segments) if s.begins <= time or s.begins < 0.0)
-        begins = max(0.0, one.begins)
-        s, v = one.motion.at(time - begins)
-        return one.ahead + s, v
-
-    def place(self, time: float) -> Place:
-        """Where its middle is at a time."""
-        if self.track is not None and time >= self.since:
-            return self.track.at(time - self.since)
-        return self.curve.at(self.along(time)[0])[:2]
-
-    def pose(self, time: float) -> tuple[Pose, float]:
-        """Its pose and speed at a time, for a rehearsal without kinematics."""
-        s, v = self.along(time)
-        if self.track is None or time < self.since:
-            return self.curve.at(s), v
-        (x, y), (x1, y1) = self.place(time), self.place(time + self.track.every_s)
-        moved = math.dist((x, y), (x1, y1))
-        heading = math.atan2(y1 - y, x1 - x) if moved else self.track.heading
-        return (x, y, heading), moved / self.track.every_s
-
-    def change(self, moment: float, motion: Motion) -> None:
-        """Begin another motion."""
-        self.segments.append(MotionSegment(moment, self.along(moment)[0], motion))
+    event: int
+    action: int
+    body: StoryBody
+    gone: float
 
 
 class StoryRun:
@@ -102,6 +50,9 @@ class StoryRun:
             StoryBody(body.id, one) for body, one in zip(script.bodies, script.testers, strict=True)
         ]
         self._by_id = {body.id: body for body in self.bodies}
+        for body in self.bodies:
+            body.paced = self._by_id.get(self.board.paces.get(body.id, ""))
+        self._turnings: list[Turning] = []
         events = self.board.events
         self._begun = [math.inf] * len(events)
         self._ends: list[list[float]] = [[math.inf] * len(event.actions) for event in events]
@@ -121,18 +72,21 @@ class StoryRun:
         for watch in self._watches.values():
             watch.look(seen, self.dt)
         self._arrive(seen)
+        self._turned(seen.time)
         self._stop_acts(seen.time)
         # An event that ends at once may let another one begin at the same moment.
         for _ in self.board.events:
-            begun = [self._started(i, seen.time) for i in range(len(self.board.events))]
+            begun = [self._started(i, seen) for i in range(len(self.board.events))]
             if not any(begun):
                 break
         if self.board.stops:
             self.stopped = self._moment(self.board.stops, seen.time) <= seen.time + self.dt
 
-    def state_moment(self, element: str, state: str) -> tuple[float, float]:
+    def state_moment(self, element: str, level: str, state: str) -> tuple[float, float]:
         """From when until when an element of the storyboard is in a state [s]."""
-        inside = [i for i, e in enumerate(self.board.events) if element in (e.name, *e.within)]
+        at = LEVELS.index(level)
+        places = [(*event.within, event.name) for event in self.board.events]
+        inside = [i for i, names in enumerate(places) if names[at] == element]
         begins = min((self._begun[i] for i in inside), default=math.inf)
         ends = max((self._end(i) for i in inside), default=math.inf)
         if state == "standbyState":
@@ -149,9 +103,9 @@ class StoryRun:
 
     # Events
 
-    def _started(self, i: int, time: float) -> bool:
+    def _started(self, i: int, seen: BoardView) -> bool:
         """Begin an event if its triggers hold soon; whether it did."""
-        event = self.board.events[i]
+        event, time = self.board.events[i], seen.time
         if self._begun[i] < math.inf or i in self._stopped:
             return False
         moment = max((self._moment(t, time) for t in event.starts), default=0.0)
@@ -162,6 +116,7 @@ class StoryRun:
             self._end_others(i, event, start)
         for k, action in enumerate(event.actions):
             self._ends[i][k] = self._begin(action, (i, k), max(start, time + self.dt))
+        self._arrive(seen)
         return True
 
     def _moment(self, trigger: StoryTrigger, time: float) -> float:
@@ -204,6 +159,8 @@ class StoryRun:
             self.variables[action.variable] = action.word
             return start
         body = self._by_id[action.body]
+        if action.legs:
+            return self._turn(body, action, key, start)
         if (before := self._owner.get(body.id)) is not None:
             i, k = before
             self._ends[i][k] = min(self._ends[i][k], start)
@@ -221,6 +178,30 @@ class StoryRun:
         motion = action.change(body.along(start)[1])
         body.change(start, motion)
         return start + sum(phase.duration for phase in motion.phases)
+
+    # Bodies that leave their way for another one
+
+    def _turn(
+        self, body: StoryBody, action: StoryAction, key: tuple[int, int], start: float
+    ) -> float:
+        """Let a body follow legs from its place on; its speed is left as it is."""
+        (x, y, o), back = body.pose(start)[0], self.board.axles_m.get(body.id, 0.0)
+        begin = x - back * math.cos(o), y - back * math.sin(o), o
+        legs = [Bend(*leg) for leg in action.legs]
+        for other in [one for one in self._turnings if one.body is body]:
+            ends = self._ends[other.event]
+            ends[other.action] = min(ends[other.action], start)
+            self._turnings.remove(other)
+        body.turn(start, PlaneCurve(begin, legs), back)
+        gone = body.along(start)[0] + sum(leg.length for leg in legs)
+        self._turnings.append(Turning(*key, body, gone))
+        return body.when(gone)
+
+    def _turned(self, time: float) -> None:
+        """Say anew when legs end that have not ended, since speeds may have changed."""
+        for event, action, body, gone in self._turnings:
+            if self._ends[event][action] > time and event not in self._stopped:
+                self._ends[event][action] = body.when(gone)
 
     # Bodies that arrive with the ego
 
@@ -242,21 +223,15 @@ class StoryRun:
         needed = action.arrival(gone, v).when(action.own_at_m - gone)
         moment = arrives - needed
         if moment < seen.time + 2 * self.dt:
-            start = max(moment, seen.time + self.dt)
-            motion = action.arrival(body.along(start)[0], v)
-            if moment < seen.time:
-                motion = self._late(body, action, start, arrives)
-            body.change(start, motion)
+            start = max(moment, seen.time + self.dt, self._begun[event])
+            gone, v = body.along(start)
+            motion = action.hurried(gone, v, arrives - start) if moment < start else None
+            if motion is None and start - moment > self.dt:
+                raise AgentError(
+                    f"{body.id} cannot arrive with the ego, which is there in "
+                    f"{arrives - start:.1f} s"
+                )
+            body.change(start, motion or action.arrival(gone, v))
             body.arrival = None
             i, k = self._owner[body.id]
             self._ends[i][k] = max(arrives, start)
-
-    def _late(self, body: StoryBody, action: StoryAction, start: float, arrives: float) -> Motion:
-        """The motion of a body that must hurry to arrive; AgentError if it would be too fast."""
-        gone, v = body.along(start)
-        motion = action.hurried(gone, v, arrives - start)
-        if motion is None:
-            raise AgentError(
-                f"{body.id} cannot arrive with the ego, which is there in {arrives - start:.1f} s"
-            )
-        return motion

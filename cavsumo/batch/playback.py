@@ -95,7 +95,9 @@ def played_back(worker: Worker, record: Record) -> Replayed:
 
 def playback_job(record: Record) -> Job:
     """The job that plays a record back; the record is that of ``for_playback``."""
-    recorded = _recording(record)
+    script = record.plan.scenario.script
+    ends = script is not None and script.board is not None and bool(script.board.stops)
+    recorded = dataclasses.replace(_recording(record), stops=ends)
     return Job(record.run, AGAIN, recorded.seed, record=True, recorded=recorded)
 
 

@@ -15,7 +15,7 @@ from cavsumo.batch.messages import Answer
 from cavsumo.batch.prepared import PreparedBatch, prepare
 from cavsumo.batch.trust import check_trust
 from cavsumo.batch.worker import Worker
-from cavsumo.errors import DivergenceError, ResultsError, shown
+from cavsumo.errors import DivergenceError, InputError, ResultsError, shown
 from cavsumo.model.bodies import STEERING, THROTTLE
 from cavsumo.model.named_networks import ENDING, is_named
 from cavsumo.model.scenario import BatchPlan
@@ -124,7 +124,7 @@ def recorded_alone(
 ) -> Record:
     """The episode in a trace; raises ResultsError when it cannot be played from that alone.
 
-    ``anew``: whether its agents are to play, and not only what they did.
+    ``anew``: whether its agents are to play, and not only what they did; see ``check_played``.
     """
     trace, name = read_trace(file), f"trace {str(file)!r}"
     head = trace.head
@@ -136,12 +136,22 @@ def recorded_alone(
             f"{name}: was played in a simulation that other episodes had used before, and is not "
             "played so any more"
         )
-    if anew and not kept:
+    if anew and not kept and trace.has_recording:
         raise ResultsError(
             f"{name}: does not hold what agent {row['agent']} had learned before, which is large; "
             "replay it from its results, or play it back with --playback"
         )
     return Record(plan, row, trace, head, file, alone=True, allowed=allowed)
+
+
+def check_played(record: Record) -> None:
+    """Raise InputError for a trace that nothing plays: an imported one has no actions."""
+    trace = record.trace
+    if record.alone and trace and not (trace.has_recording or trace.head["memory_kept"]):
+        raise InputError(
+            f"trace {str(record.file)!r}: has tracks without actions, as imported episodes have, "
+            f"so nothing plays it again; show it with: {record.command} --recorded --html FILE"
+        )
 
 
 # Played again

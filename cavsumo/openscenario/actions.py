@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, NamedTuple
 
 from cavsumo.model.curve import Pose
 from cavsumo.model.scenario.storyboard import StoryAction
@@ -13,6 +13,22 @@ from cavsumo.openscenario.nodes import XmlNode
 from cavsumo.openscenario.placing import Beginning, Beginnings
 
 MOST_PLACES = 100_000  # of a track
+
+
+class LeadingGap(NamedTuple):
+    """A gap that an entity has before another one.
+
+    Attributes:
+        node: the action.
+        after: the entity behind.
+        metres: between their boxes.
+        kept: whether it is kept until the entity changes its speed.
+    """
+
+    node: XmlNode
+    after: str
+    metres: float
+    kept: bool
 
 
 @dataclass
@@ -27,7 +43,7 @@ class Actions:
         step: length of a timestep [s], that of tracks.
         variables: names of the variables.
         deleted: entities that are removed at the beginning.
-        headways: gaps before the ego that entities take up at the beginning [m].
+        gaps: that entities take up at the beginning.
     """
 
     beginnings: Beginnings
@@ -37,7 +53,18 @@ class Actions:
     step: float
     variables: Mapping[str, str]
     deleted: list[str] = field(default_factory=list)
-    headways: dict[str, float] = field(default_factory=dict)
+    gaps: dict[str, LeadingGap] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        for name in self.ids:
+            gap = self.beginnings.of(self.beginnings.init, name).gap
+            if gap is not None:
+                self._gap(gap, name)
+
+    @property
+    def paces(self) -> dict[str, str]:
+        """The bodies that keep a gap, with those before which they keep it."""
+        return {self.ids[k]: self.ids[gap.after] for k, gap in self.gaps.items() if gap.kept}
 
     def of_event(self, event: XmlNode, actors: list[str], at_once: bool) -> list[StoryAction]:
         """The actions of an event for its actors; ``at_once``: it happens at the beginning."""
@@ -82,7 +109,9 @@ class Actions:
             inner = one.one()
             if inner.tag == "SpeedAction":
                 return [speed_action(inner, body)]
-            self._headway(inner, name, at_once)
+            if not at_once:
+                raise inner.refused("is understood at the beginning only")
+            self._gap(inner, name)
             return []
         if one.tag == "SynchronizeAction":
             return [self._arrival(one, name, body)]
@@ -90,16 +119,17 @@ class Actions:
             return [self._track(one.one(), name, body)]
         raise one.refused("is not understood in an event; understood: LongitudinalAction, ...")
 
-    def _headway(self, one: XmlNode, name: str, at_once: bool) -> None:
-        """A gap that an entity takes up at the beginning."""
-        if one.truth("continuous") or not at_once:
-            raise one.refused("is understood with continuous false, at the beginning only")
+    def _gap(self, one: XmlNode, name: str) -> None:
+        """A gap before another entity that an entity takes up at the beginning, or keeps."""
+        leader, kept = one.word("entityRef"), one.truth("continuous")
         given = one.word("displacement", "leadingReferencedEntity")
-        if one.word("entityRef") != self.ego or given != "leadingReferencedEntity":
-            raise one.refused(f"is understood for entities that lead {self.ego}")
+        if given != "leadingReferencedEntity" or leader == name or name == self.ego:
+            raise one.refused("is understood for entities that lead another one")
+        if kept and leader == self.ego:
+            raise one.refused("continuous: expected false, nobody adapts to the vehicle under test")
         if not one.truth("freespace") or not one.has("distance"):
             raise one.refused("is understood with freespace true and a distance")
-        self.headways[name] = one.number("distance")
+        self.gaps[name] = LeadingGap(one, leader, one.number("distance"), kept)
 
     def _arrival(self, one: XmlNode, name: str, body: str) -> StoryAction:
         """A body that arrives at a place as the ego arrives at one."""
@@ -132,8 +162,13 @@ class Actions:
         if one.tag != "FollowTrajectoryAction":
             raise one.refused("is not understood in an event")
         course, begins = self.beginnings.followed(one)
+        if course.relative and not begins:
+            return _action(body=body, legs=course.legs)
         if not course.times:
-            raise one.refused("a trajectory without times is understood at the beginning only")
+            raise one.refused(
+                "a trajectory in an event needs times, or begins where its entity is: a "
+                "ClothoidSpline without PositionStart and initialDistanceOffset"
+            )
         if begins > 1e-9 and at_own_time(one):
             raise one.refused("times: expected those of a track that begins with its event")
         return _action(body=body, track=self.track_of(course, self.beginnings.of(one, name)))

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass
+from typing import Any
 
 from cavsumo.errors import UnknownName
 from cavsumo.model.curve import Pose
-from cavsumo.model.scenario.storyboard import StoryCondition, StoryTrigger
+from cavsumo.model.scenario.storyboard import LEVELS, StoryCondition, StoryTrigger
 from cavsumo.openscenario.files import compared
 from cavsumo.openscenario.nodes import XmlNode
 from cavsumo.openscenario.places import Places
@@ -45,6 +46,7 @@ class Conditions:
         elements: names of the elements of the storyboard.
         variables: names of its variables.
         move: brings a place to the road that is played on.
+        backwards: bodies that drive backwards: what they look at lies behind.
     """
 
     places: Places
@@ -52,6 +54,7 @@ class Conditions:
     elements: Collection[str]
     variables: Collection[str]
     move: Callable[[Pose], Pose]
+    backwards: Collection[str] = ()
 
     def trigger(self, holder: XmlNode | None) -> StoryTrigger | None:
         """The trigger of an element that holds condition groups; None for never.
@@ -93,7 +96,19 @@ class Conditions:
             "bodies": tuple(self.body(who, name) for name in names),
             "all_of_them": rule == "all",
         }
-        return StoryCondition.model_validate({**shared, **bodies, **self._by_entity(inner)})
+        content = {**bodies, **self._by_entity(inner)}
+        return StoryCondition.model_validate({**shared, **self._signed(inner, content)})
+
+    def _signed(self, holder: XmlNode, content: dict[str, Any]) -> dict[str, Any]:
+        """A condition of bodies that drive backwards: their speeds are below 0 in the scenario."""
+        named = {*content["bodies"], content.get("other", "")}
+        sort, back = content["sort"], named.intersection(self.backwards)
+        if not back or sort not in ("speed", "relative-speed", "angle"):
+            return content
+        if sort != "speed" or back != {*content["bodies"]}:
+            raise holder.refused("is not understood of an entity that drives backwards")
+        more, less = ("greater", "less") if "greater" in content["rule"] else ("less", "greater")
+        return {**content, "rule": content["rule"].replace(more, less), "value": -content["value"]}
 
     def _of_parameter(self, one: XmlNode, condition: XmlNode) -> bool:
         """Whether a condition of a parameter holds."""
@@ -123,7 +138,9 @@ class Conditions:
         if element not in self.elements:
             place = f"{one.xml.file!r}: line {one.xml.line}"
             raise UnknownName("element of the storyboard", element, self.elements, place)
-        return {"sort": "state", "element": element, "state": one.choice("state", STATES)}
+        level = one.choice("storyboardElementType", LEVELS)
+        state = one.choice("state", STATES)
+        return {"sort": "state", "element": element, "level": level, "state": state}
 
     def _by_entity(self, holder: XmlNode) -> dict[str, object]:
         """A condition of entities."""

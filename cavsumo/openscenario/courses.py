@@ -22,12 +22,14 @@ class Trajectory:
         node: the trajectory.
         begin, legs: a way; ``curve`` is made of them.
         times: of a polyline with times: when the reference point has which pose; else empty.
+        relative: it begins where its entity is, and ``begin`` is no place.
     """
 
     node: XmlNode
     begin: Pose
     legs: tuple[Bend, ...] = ()
     times: tuple[tuple[float, Pose], ...] = ()
+    relative: bool = False
 
     @property
     def curve(self) -> PlaneCurve:
@@ -81,9 +83,12 @@ def _spline(trajectory: XmlNode, shape: XmlNode, pose: Callable[[XmlNode], Pose]
             raise one.refused("hOffset and timeStart are not understood")
         ends = one.number("curvatureStart"), one.number("curvatureEnd")
         legs.append(Bend(one.number("length"), *ends))
-    if not segments or segments[0].maybe("PositionStart") is None:
-        raise shape.refused("expected PositionStart in the first segment")
-    return Trajectory(trajectory, pose(segments[0].one("PositionStart")), tuple(legs))
+    if not segments:
+        raise shape.refused("expected a ClothoidSplineSegment")
+    start = segments[0].maybe("PositionStart")
+    if start is None:
+        return Trajectory(trajectory, (0.0, 0.0, 0.0), tuple(legs), relative=True)
+    return Trajectory(trajectory, pose(start), tuple(legs))
 
 
 def _polyline(

@@ -140,6 +140,8 @@ class Places:
 
     def _on_trajectory(self, node: XmlNode) -> GivenPlace:
         course = self.course(self.resolved(node.one("TrajectoryRef"), "Trajectory"))
+        if course.relative:
+            raise node.refused("the trajectory has no PositionStart, so it is nowhere")
         x, y, o = course.curve.at(node.number("s"))
         t = node.number("t", 0.0)
         return _oriented(node, GivenPlace((x - t * math.sin(o), y + t * math.cos(o), o)))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 from cavsumo.errors import UnknownName
 from cavsumo.model.curve import Bend, PlaneCurve
@@ -13,7 +13,7 @@ from cavsumo.openscenario.entities import Entity
 from cavsumo.openscenario.files import ScenarioFiles
 from cavsumo.openscenario.nodes import XmlNode
 from cavsumo.openscenario.places import GivenPlace, Places
-from cavsumo.openscenario.roads import RoadMap, RoadStage
+from cavsumo.openscenario.roads import RoadMap, RoadStage, turned
 
 
 @dataclass
@@ -26,6 +26,8 @@ class Beginning:
         speed: how fast it is [m/s].
         course: the way of its reference point from there on.
         track_from: when its course begins, if that has times; None for a course without.
+        gap: the distance to another entity that it takes up; None for none.
+        backwards: whether it drives backwards; then ``entity`` has its rear as its front.
     """
 
     entity: Entity
@@ -33,6 +35,20 @@ class Beginning:
     speed: float
     course: Trajectory
     track_from: float | None = None
+    gap: XmlNode | None = None
+    backwards: bool = False
+
+
+@dataclass
+class _Init:
+    """What the actions of an entity at the beginning say."""
+
+    spot: GivenPlace | None = None
+    route: XmlNode | None = None
+    course: Trajectory | None = None
+    start: float = 0.0
+    speed: float = 0.0
+    gap: XmlNode | None = None
 
 
 @dataclass
@@ -80,23 +96,36 @@ class Beginnings:
 
     def _begun(self, entity: Entity) -> Beginning:
         """The beginning of an entity."""
-        spot, route, course, start, speed = None, None, None, 0.0, 0.0
+        found = _Init()
         for one in self._actions(entity.name):
+            inner = one.one() if one.tag in ("LongitudinalAction", "RoutingAction") else one
             if one.tag == "TeleportAction":
-                spot = self.places.spot(one.one("Position"))
+                found.spot = self.places.spot(one.one("Position"))
+            elif inner.tag == "LongitudinalDistanceAction":
+                found.gap = inner
             elif one.tag == "LongitudinalAction":
-                speed = first_speed(one.one())
-            elif one.tag == "RoutingAction" and (inner := one.one()).tag == "AssignRouteAction":
-                route = self.places.resolved(inner, "Route")
-            elif one.tag == "RoutingAction":
-                course, start = self.followed(one.one("FollowTrajectoryAction"))
+                found.speed = first_speed(inner)
+            elif inner.tag == "AssignRouteAction":
+                found.route = self.places.resolved(inner, "Route")
+            elif inner.tag == "FollowTrajectoryAction":
+                found.course, found.start = self.followed(inner)
             elif one.tag != "AppearanceAction":
                 raise one.refused("is not understood at the beginning")
-        if course is not None:
-            return self._on_course(entity, course, start, speed)
+        begun = self._placed(entity, found)
+        begun.gap = found.gap
+        return _backwards(begun) if begun.speed < 0.0 else begun
+
+    def _placed(self, entity: Entity, found: _Init) -> Beginning:
+        """The beginning of an entity with the actions that it has there."""
+        spot, course = found.spot, found.course
+        if course is not None and not course.relative:
+            return self._on_course(entity, course, found.start, found.speed)
         if spot is None:
             raise entity.node.refused(f"{entity.name} has no place: no TeleportAction in Init")
-        return Beginning(entity, spot, speed, self._way_on(entity, spot, route))
+        if course is not None:
+            here = replace(course, begin=spot.pose, relative=False)
+            return self._on_course(entity, here, found.start, found.speed)
+        return Beginning(entity, spot, found.speed, self._way_on(entity, spot, found.route))
 
     def _actions(self, name: str) -> list[XmlNode]:
         """The private actions of an entity at the beginning."""
@@ -150,6 +179,20 @@ class Beginnings:
         if route is not None:
             stages = _from(stages[0], self.places.stages(route))
         return Trajectory(entity.node, spot.pose, tuple(_legs(entity.node, stages, spot)))
+
+
+def _backwards(one: Beginning) -> Beginning:
+    """The beginning of an entity that drives backwards, as one that drives forwards.
+
+    Its rear is its front; it looks against the way that it drives along.
+    """
+    if not one.course.legs or one.course.times:
+        raise one.entity.node.refused(
+            f"{one.entity.name} drives backwards, which is understood along a trajectory only"
+        )
+    entity = replace(one.entity, ahead=-one.entity.ahead)
+    spot = one.spot._replace(pose=turned(one.spot.pose, math.pi))
+    return replace(one, entity=entity, spot=spot, speed=-one.speed, backwards=True)
 
 
 def first_speed(action: XmlNode) -> float:

@@ -75,7 +75,7 @@ def read_scenario(source: ScenarioSource) -> ReadScenario:
     board = whole.one("Storyboard")
     beginnings = Beginnings(entities, board.one("Init"), files, roads, _variables(whole))
     ego = beginnings.of(board, source.ego)
-    if ego.speed <= 0.0:
+    if ego.speed == 0.0:
         raise ego.entity.node.refused(f"{source.ego} needs a speed at the beginning")
     ground = ground_of(ego, roads)
     made = script_of(file.stem, source.ego, source.step, beginnings, board, ground)
@@ -86,8 +86,9 @@ def read_scenario(source: ScenarioSource) -> ReadScenario:
         "script": made.model_dump(mode="json", exclude_none=True)
         | {"parameters": dict(source.values)},
     }
-    notes = [*([ground.note] if ground.note else []), *_without_effect(root)]
-    return ReadScenario(settings, ground.places, tuple(notes))
+    back = f"{source.ego} drives backwards: played as a vehicle with its rear as its front"
+    notes = [ground.note, back if ego.backwards else "", *_without_effect(root)]
+    return ReadScenario(settings, ground.places, tuple(note for note in notes if note))
 
 
 def _parameters(whole: XmlNode, source: ScenarioSource) -> dict[str, Value]:

@@ -9,11 +9,11 @@ from typing import Any
 from pydantic import ValidationError
 
 from cavsumo.agents.rehearsal import nominal_contact
-from cavsumo.errors import InputError, UnknownName
+from cavsumo.errors import AgentError, InputError, UnknownName
 from cavsumo.model.documents import first_problem
 from cavsumo.model.scenario.script import ScriptedTest
 from cavsumo.model.scenario.storyboard import EGO, HURRY, StoryEvent
-from cavsumo.openscenario.actions import Actions
+from cavsumo.openscenario.actions import Actions, LeadingGap
 from cavsumo.openscenario.board import elements_of, events_in, story_events
 from cavsumo.openscenario.conditions import Conditions
 from cavsumo.openscenario.ground import Ground
@@ -55,6 +55,7 @@ def script_of(
         "board": {
             "events": [event.model_dump() for event in events],
             "axles_m": {actions.ids[k]: one.entity.ahead for k, one in everybody.items()},
+            "paces": actions.paces,
             "variables": dict(read.variables),
             "stops": read.stops(actions.ids),
         },
@@ -65,6 +66,8 @@ def script_of(
         return ScriptedTest.model_validate(content)
     except ValidationError as error:
         raise InputError(f"{board.xml.file!r}: {first_problem(error)}") from error
+    except AgentError as error:
+        raise InputError(f"{board.xml.file!r}: {error}") from error
 
 
 class _BoardReader:
@@ -93,7 +96,10 @@ class _BoardReader:
     def _conditions(self, ids: Mapping[str, str]) -> Conditions:
         """The reader of conditions."""
         names, places = elements_of(self._events), self._beginnings.places
-        return Conditions(places, _body(ids), names, self.variables, self._ground.move)
+        found = Conditions(places, _body(ids), names, self.variables, self._ground.move)
+        entities = ((name, self._beginnings.of(self._board, name)) for name in ids)
+        found.backwards = {ids[name] for name, one in entities if one.backwards}
+        return found
 
 
 def _body(ids: Mapping[str, str]) -> Callable[[XmlNode, str], str]:
@@ -140,11 +146,12 @@ def _programme(one: Beginning, actions: Actions, ground: Ground, fastest: float)
             "reference point is the middle of their box"
         )
     top = HURRY * max(fastest, one.speed)
-    headway = actions.headways.get(entity.name)
-    way = _way(one, ground, entity.ahead)
-    if headway is not None:
-        way = _led(way, headway, entity.length, actions, ground)
-    return found | {"way": way, "speed_mps": one.speed, "top_mps": top}
+    way, speed, gap = _way(one, ground, entity.ahead), one.speed, actions.gaps.get(entity.name)
+    if gap is not None:
+        other = _behind(gap, actions)
+        way = _led(way, gap, entity.length, other, ground)
+        speed = other.speed if gap.kept else speed
+    return found | {"way": way, "speed_mps": speed, "top_mps": top}
 
 
 def _waited(track: dict[str, Any], begins: float) -> dict[str, Any]:
@@ -171,16 +178,23 @@ def _way(one: Beginning, ground: Ground, ahead: float) -> dict[str, Any]:
     }
 
 
+def _behind(gap: LeadingGap, actions: Actions) -> Beginning:
+    """The beginning of the entity behind a gap."""
+    if gap.after not in actions.ids or gap.after in actions.gaps:
+        raise gap.node.refused(f"{gap.after} has no place of its own")
+    other = actions.beginnings.of(gap.node, gap.after)
+    if gap.kept and (other.course.times or not other.course.straight):
+        raise gap.node.refused(f"continuous: expected false, {gap.after} does not go straight")
+    return other
+
+
 def _led(
-    way: dict[str, Any], headway: float, length: float, actions: Actions, ground: Ground
+    way: dict[str, Any], gap: LeadingGap, length: float, other: Beginning, ground: Ground
 ) -> dict[str, Any]:
-    """A way that begins with a gap before the ego."""
-    ego = actions.beginnings.of(actions.beginnings.init, actions.ego)
-    x, y, o = ground.move(ego.course.begin)
+    """A way that begins with a gap before another entity."""
+    x, y, o = ground.move(other.course.begin)
     if math.cos(way["heading_rad"] - o) < 0.999:
-        raise ego.entity.node.refused(
-            "a gap is understood for entities that drive ahead of the ego"
-        )
+        raise gap.node.refused(f"is understood for entities that go the way of {gap.after}")
     along = (way["x_m"] - x) * math.cos(o) + (way["y_m"] - y) * math.sin(o)
-    by = ego.entity.front + headway + length / 2 - along
+    by = other.entity.front + gap.metres + length / 2 - along
     return {**way, "x_m": way["x_m"] + by * math.cos(o), "y_m": way["y_m"] + by * math.sin(o)}

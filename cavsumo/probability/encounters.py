@@ -8,7 +8,7 @@ likelihood ratios are exact.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -19,7 +19,7 @@ from cavsumo.model.bodies import CAR, WALKING, Kind
 from cavsumo.network.pedestrian_starts import APART_M
 from cavsumo.network.recorded_starts import start_record
 from cavsumo.network.site import Site
-from cavsumo.probability.exposure import Exposure
+from cavsumo.probability.exposure import Exposure, exposure_of
 from cavsumo.probability.stratified import Cut, cuts_of
 from cavsumo.probability.tree import Floats
 from cavsumo.probability.vehicle_encounters import KINDS, VehicleEncounters, vehicle_encounters
@@ -133,22 +133,39 @@ class Encounters:
         raise NetworkError(f"no room for {self.bodies} testers on the pavements: use fewer")
 
 
+def encounters_for(
+    params: Mapping[str, Any], site: Site, kind: Kind, teams: Teams
+) -> Encounters | VehicleEncounters:
+    """The encounters of the exposure that an agent's parameters name; raises InputError."""
+    exposure, named = exposure_of(params)
+    return encounters_of(site, kind, teams, exposure, named=named)
+
+
 def encounters_of(
-    site: Site, kind: Kind, teams: Teams, exposure: Exposure, ego: Kind = CAR
+    site: Site,
+    kind: Kind,
+    teams: Teams,
+    exposure: Exposure,
+    ego: Kind = CAR,
+    named: str = "exposure",
 ) -> Encounters | VehicleEncounters:
     """The encounters at a site; raises InputError where the exposure has no support there.
 
-    ``ego``: the kind of the ego, which vehicles start apart from.
+    Args:
+        site, kind, teams: where they are, the kind of bodies, and for each agent their indices.
+        exposure: what they do by chance.
+        ego: the kind of the ego, which vehicles start apart from.
+        named: the exposure in the sentence of an error.
     """
     if kind.name in KINDS:
-        return vehicle_encounters(site, kind, ego, teams, getattr(exposure, kind.name))
+        return vehicle_encounters(site, kind, ego, teams, getattr(exposure, kind.name), named)
     if kind.name not in WALKING:
         known = f"{', '.join(WALKING)}, {' and '.join(KINDS)}"
-        raise InputError(f"exposure: kind {kind.name!r}: only {known} have one")
+        raise InputError(f"{named}: kind {kind.name!r}: only {known} have one")
     try:
         exposure.speed_mps.within(SLOWEST_MPS, kind.v_max)
     except ValueError as error:
-        raise InputError(f"exposure: speed_mps: {error}, the speeds of a {kind.name}") from error
+        raise InputError(f"{named}: speed_mps: {error}, the speeds of a {kind.name}") from error
     names = [*NAMES, *([ON_RED] if any(one.signalled for one in site.marked) else [])]
     names += STOPS if exposure.hesitation.share > 0.0 else ()
     places = walks_at(site, kind).places

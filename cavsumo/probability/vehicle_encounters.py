@@ -134,13 +134,13 @@ class VehicleEncounters:
 
 
 def vehicle_encounters(
-    site: Site, kind: Kind, ego: Kind, teams: Teams, exposure: VehicleExposure
+    site: Site, kind: Kind, ego: Kind, teams: Teams, exposure: VehicleExposure, named: str
 ) -> VehicleEncounters:
     """The encounters with vehicles at a site; raises InputError without support there."""
     try:
         exposure.speed_mps.within(SLOWEST_MPS, math.inf)
     except ValueError as error:
-        raise InputError(f"exposure: {kind.name}.speed_mps: {error}, its speeds") from error
+        raise InputError(f"{named}: {kind.name}.speed_mps: {error}, its speeds") from error
     ways = tuple(
         one for one in site.approaches if math.isfinite(one.wait) and one.ego_enter >= NEAREST_M
     )

@@ -27,11 +27,20 @@ def _estimate(file: Path, *more: str, most: int = MOST) -> int:
     return main([*words, *more])
 
 
+FAST = """
+[speed_mps]
+distribution = "normal"
+mean = 9.0
+sd = 0.1
+"""
+
+
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A folder with an exposure under which an ego that never brakes fails often."""
+    """A folder with two exposures: an ego that never brakes fails often, and nobody can walk."""
     found = tmp_path_factory.mktemp("estimate")
     (found / "often.toml").write_text(OFTEN, encoding="utf-8")
+    (found / "fast.toml").write_text(FAST, encoding="utf-8")
     return found
 
 
@@ -194,6 +203,10 @@ def test_vehicles_meet_the_ego(kind: str, tmp_path: Path, capsys: Capture) -> No
         (["--bound", "1.5"], "--bound: expected a probability between 0 and 1, got 1.5"),
         (["--method", "splitting"], "argument --method: invalid choice: 'splitting'"),
         (["--exposure", "none.toml"], "none.toml"),
+        (
+            ["--exposure", "fast.toml"],
+            "fast.toml': speed_mps: expected a distribution with mass bet",
+        ),
         (["--agent", "timing"], "--agent: expected none"),
         (["--picture", "a.gif"], "--picture 'a.gif': expected a name that ends in .svg or .png"),
         (["--against", "sumo", "--method", "importance"], "--against: needs --method monte-carlo"),
@@ -203,9 +216,15 @@ def test_vehicles_meet_the_ego(kind: str, tmp_path: Path, capsys: Capture) -> No
     ],
 )
 def test_an_estimate_that_is_impossible_is_refused(
-    words: list[str], said: str, tmp_path: Path, capsys: Capture
+    words: list[str],
+    said: str,
+    folder: Path,
+    tmp_path: Path,
+    capsys: Capture,
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     """One sentence, and nothing is written."""
+    monkeypatch.chdir(folder)  # exposures
     assert _estimate(tmp_path / "no.csv", "-q", *words) == Exit.USAGE
     assert said in capsys.readouterr().err
     assert not list(tmp_path.iterdir())

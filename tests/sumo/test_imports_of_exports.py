@@ -54,6 +54,34 @@ def test_an_export_becomes_the_same_episode(
     assert done.returncode == 0, done.stderr
 
 
+@pytest.mark.parametrize(
+    "words",
+    [
+        ("replay", "again.jsonl.gz"),
+        ("replay", "again.jsonl.gz", "--html", "new.html"),
+        ("replay", "again.jsonl.gz", "--playback"),
+        ("keep", "again.jsonl.gz", "-o", "new.cavtest"),
+        ("minimise", "again.jsonl.gz", "-o", "new.cavtest"),
+    ],
+)
+def test_an_import_is_shown_and_not_played(
+    exported: tuple[Path, Trace], tmp_path: Path, words: tuple[str, ...]
+) -> None:
+    """One sentence says what it is and what to type, and nothing is written."""
+    folder, trace = exported
+    file, net = str(folder / "test.xosc"), str(trace.head["plan"]["scenario"]["net"])
+    done = command(tmp_path, "import", file, "--net", net, "-o", "again.jsonl.gz")
+    assert done.returncode == 0, done.stderr
+    done = command(tmp_path, *words)
+    assert done.returncode == 2
+    assert done.stderr.splitlines()[-1] == (
+        "cavsumo: trace 'again.jsonl.gz': has tracks without actions, as imported episodes have, "
+        "so nothing plays it again; show it with: "
+        "cavsumo replay again.jsonl.gz --recorded --html FILE"
+    )
+    assert [one.name for one in tmp_path.iterdir()] == ["again.jsonl.gz"]
+
+
 def test_another_track_is_another_verdict(exported: tuple[Path, Trace], tmp_path: Path) -> None:
     """Without the collision at its end nothing was violated; the file says otherwise."""
     folder, trace = exported

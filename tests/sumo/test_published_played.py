@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 from pathlib import Path
 
 import pytest
@@ -15,10 +16,12 @@ from published_tracks import (
     Reference,
     differences,
     references,
+    states,
 )
 from support import rows
 
 import cavsumo
+from cavsumo.openscenario.reading import ScenarioSource, read_scenario
 from cavsumo.results.traces import read_trace
 
 # A slow and a fast case of each scenario; tests/unit/test_published_scenarios.py has all of them.
@@ -90,6 +93,40 @@ def test_the_road_of_the_file_is_played_and_replayed_without_it(tmp_path: Path) 
     again = command(tmp_path, "replay", str(file), "0")
     assert again.returncode == 0, again.stderr
     assert "the same" in again.stdout
+
+
+def test_a_stop_trigger_ends_a_playback_where_it_ended_the_episode(tmp_path: Path) -> None:
+    """Same verdict and same time, played anew and played back."""
+    file = tmp_path / "results.csv"
+    words = ("--scenario", str(SCENARIOS / BICYCLIST), "--ego", "time-gap", "--trace", "all")
+    done = command(tmp_path, "run", *words, "-o", str(file))
+    assert done.returncode == 0, done.stderr
+    (row,) = rows(file)
+    assert row["outcome"] == "held"
+    assert float(row["time_s"]) < 20.0  # the horizon is at 60 s
+    for way in ([], ["--playback"]):
+        again = command(tmp_path, "replay", str(file), "0", *way)
+        assert again.returncode == 0, again.stderr
+        assert "the same" in again.stdout
+
+
+def test_a_body_that_leaves_its_way_is_where_a_rehearsal_has_it(tmp_path: Path) -> None:
+    """Within 0.01 m, on both arcs of its lane change too; the box in front keeps its gap."""
+    script = cavsumo.run(
+        scenario=SCENARIOS / "overtaker.xosc",
+        ego="constant",
+        trace="all",
+        output=tmp_path / "results.csv",
+        progress=False,
+    )
+    (row,) = script.rows.to_dict("records")
+    made = read_scenario(ScenarioSource(SCENARIOS / "overtaker.xosc", {}))
+    trace, expected = read_trace(tmp_path / row["trace"]), states(made)
+    assert trace.frames[-1]["time_s"] > 5.0
+    for frame, (time, bodies) in zip(trace.frames, expected, strict=False):
+        assert frame["time_s"] == pytest.approx(time)
+        for name, (x, y, *_) in frame["testers"].items():
+            assert math.dist((x, y), bodies[name][1:3]) < 0.01
 
 
 def test_a_straight_road_is_laid_where_the_file_has_none(tmp_path: Path) -> None:

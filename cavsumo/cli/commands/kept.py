@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from cavsumo.batch.located import located
-from cavsumo.batch.replay import Record, recorded, recorded_alone
+from cavsumo.batch.replay import Record, check_played, recorded, recorded_alone
 from cavsumo.batch.replaying import Located, play_back
 from cavsumo.cli.requests.kept import KeepOptions
 from cavsumo.cli.steps import SlowSteps, say_written
@@ -22,6 +22,7 @@ from cavsumo.results.trace_file import is_trace
 def minimise(wanted: KeepOptions) -> int:
     """Make a failure as small as it can be, tell it in a sentence, and write it."""
     record = found_episode(wanted)
+    check_played(record)
     with SlowSteps(quiet=wanted.quiet) as steps:
         steps.begin(f"making run {record.run} smaller")
 
@@ -45,6 +46,7 @@ def keep(wanted: KeepOptions) -> int:
     """Play an episode back and write it as one file."""
     assert wanted.output is not None
     record = found_episode(wanted)
+    check_played(record)
     with SlowSteps() as steps:
         steps.begin(f"playing run {record.run} back")
         located_record = _here(wanted)(record)

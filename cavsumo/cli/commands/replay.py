@@ -8,7 +8,7 @@ from pathlib import Path
 
 from cavsumo.batch.located import located
 from cavsumo.batch.prepared import PreparedBatch, manifest
-from cavsumo.batch.replay import Record, recorded, recorded_alone
+from cavsumo.batch.replay import Record, check_played, recorded, recorded_alone
 from cavsumo.batch.replaying import play_again, play_back
 from cavsumo.batch.shown import shown_site
 from cavsumo.cli.requests.replay import ReplayOptions
@@ -32,6 +32,8 @@ def replay(file: Path, wanted: ReplayOptions) -> int:
         raise InputError("replay: --recorded plays nothing and --playback plays; name one of them")
     with SlowSteps() as steps:
         record = _found(file, wanted)
+        if not wanted.recorded:
+            check_played(record)
         steps.begin(f"replaying run {record.run}")
         record, trace, site = _taken(record, wanted)
         if wanted.shown and trace is None:
@@ -82,7 +84,8 @@ def _found(file: Path, wanted: ReplayOptions) -> Record:
     if is_cavtest(file):
         return read_cavtest(file, allowed).record
     if is_trace(file):
-        return recorded_alone(file, allowed, anew=not (wanted.playback or wanted.shown))
+        anew = not (wanted.recorded or wanted.playback or wanted.shown)
+        return recorded_alone(file, allowed, anew=anew)
     assert wanted.run is not None
     return recorded(file, wanted.run, allowed)
 

@@ -6,6 +6,7 @@ the coordinates of the network. Bodies are named as in snapshots: ``ego``, ``tes
 
 from __future__ import annotations
 
+import math
 from typing import Annotated, Literal, Self
 
 from pydantic import BaseModel, ConfigDict, Field, model_validator
@@ -15,7 +16,7 @@ from cavsumo.model.scenario.sensor import Finite
 from cavsumo.model.scenario.track import Place, ScriptedTrack
 
 EGO = "ego"
-HURRY = 1.5  # times its final speed: no body is faster than that to arrive
+HURRY = 2.0  # times its final speed: no body is faster than that to arrive
 Sort = Literal[
     "angle",
     "collision",
@@ -36,6 +37,8 @@ Rule = Literal["greaterThan", "greaterOrEqual", "lessThan", "lessOrEqual", "equa
 Axis = Literal["cartesian", "longitudinal", "lateral"]
 Edge = Literal["none", "rising", "falling", "risingOrFalling"]
 State = Literal["standbyState", "runningState", "completeState", "startTransition", "endTransition"]
+LEVELS = ("story", "act", "maneuverGroup", "maneuver", "event")  # of the elements of a storyboard
+Level = Literal["story", "act", "maneuverGroup", "maneuver", "event"]
 Speed = Annotated[float, Field(ge=0, le=100, allow_inf_nan=False)]
 
 
@@ -62,6 +65,7 @@ class StoryCondition(BoardPart):
     axis: Axis = Field("cartesian", description="along which distances are measured, the body's")
     freespace: bool = False
     element: str = Field("", description="whose state it is, or the name of a variable")
+    level: Level = Field("event", description="of the element whose state it is")
     state: State | None = None
     word: str = Field("", description="the value of a variable")
     tolerance: Finite = Field(0.0, ge=0, description="of an angle, both in rad")
@@ -82,7 +86,7 @@ StoryTrigger = tuple[Together, ...]  # any of these; without any, at once
 
 
 class StoryAction(BoardPart):
-    """One action: a change of speed of a body, its track, or the value of a variable.
+    """One action: a change of speed of a body, its way, its track, or the value of a variable.
 
     A change of speed is at once, or lasts ``in_s``, ``over_m`` or has the rate ``by_mps2``. With
     ``ego_at_m`` it begins so that the body has gone ``own_at_m`` as the ego's front is there,
@@ -97,14 +101,18 @@ class StoryAction(BoardPart):
     ego_at_m: Finite | None = None
     own_at_m: Finite | None = None
     steady_m: Finite = Field(0.0, ge=0)
+    legs: tuple[tuple[Finite, Finite, Finite], ...] = Field(
+        (), description="length [m] and curvatures at both ends [1/m], from its place on"
+    )
     track: ScriptedTrack | None = None
     variable: str = ""
     word: str = ""
 
     @model_validator(mode="after")
-    def _one_of_three(self) -> Self:
-        if [self.to_mps is not None, self.track is not None, bool(self.variable)].count(True) != 1:
-            raise ValueError("must have one of to_mps, track and variable")
+    def _one_of_four(self) -> Self:
+        given = [self.to_mps is None, self.track is None, not self.variable, not self.legs]
+        if given.count(False) != 1:
+            raise ValueError("must have one of to_mps, legs, track and variable")
         if [self.in_s, self.over_m, self.by_mps2, self.ego_at_m].count(None) < 3:
             raise ValueError("must have at most one of in_s, over_m, by_mps2 and ego_at_m")
         if (self.ego_at_m is None) != (self.own_at_m is None):
@@ -137,10 +145,11 @@ class StoryAction(BoardPart):
     def hurried(self, gone: float, v: float, left: float) -> Motion | None:
         """The motion of a body that has less time than ``arrival`` takes; None if it is too little.
 
-        Two even changes of speed of the same duration T / 2 over the distance d before its steady
-        speed: from v to u, and from u to the final speed w, with::
+        It gains speed and loses it again at the same rate a, the least one with which it arrives in
+        time: over the distance d and time T before its steady speed from v to u, and from u to the
+        final speed w, with::
 
-            d = T / 4 (v + 2 u + w)
+            T = (2 u - v - w) / a,    d = (2 u^2 - v^2 - w^2) / (2 a)
 
         ``left``: the time until it arrives [s].
         """
@@ -150,11 +159,12 @@ class StoryAction(BoardPart):
         time = left - self.steady_m / w
         if over <= 0.0 or time <= 0.0:
             return None
-        u = (4.0 * over / time - v - w) / 2.0
-        if not 0.0 <= u <= HURRY * max(v, w):
+        square = over * over - over * time * (v + w) + time * time * (v * v + w * w) / 2.0
+        u = (over + math.sqrt(max(0.0, square))) / time
+        rate = (2.0 * u - v - w) / time
+        if rate <= 0.0 or u > HURRY * max(v, w):
             return None
-        half = time / 2.0
-        return motion_of(v, [Phase((u - v) / half, half), Phase((w - u) / half, half)])
+        return motion_of(v, [to_speed_by(v, u, rate), to_speed_by(u, w, rate)])
 
 
 class StoryEvent(BoardPart):
@@ -181,12 +191,14 @@ class Storyboard(BoardPart):
 
     Attributes:
         axles_m: how far the reference point of each body lies behind the middle of its box, by id.
+        paces: bodies that keep their distance to another one until they change their speed, by id.
         variables: the values of variables at the beginning.
         stops: any of them ends the episode; without any, its horizon does.
     """
 
     events: tuple[StoryEvent, ...] = ()
     axles_m: dict[str, Finite] = Field(default_factory=dict)
+    paces: dict[str, str] = Field(default_factory=dict)
     variables: dict[str, str] = Field(default_factory=dict)
     stops: StoryTrigger = ()
 
