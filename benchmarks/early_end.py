@@ -1,8 +1,9 @@
-"""The time that a search saves by ending episodes in which nobody can meet the ego any more.
+"""The time that is saved by ending episodes in which nobody can meet the ego any more.
 
     python benchmarks/early_end.py --net crossing --net junction --runs 200
 
-Plays the same points in turns, to their ends and cut, and compares what a searcher learns of them.
+Plays the same points of a search, or with ``--agent exposure`` the same encounters of an estimate,
+to their ends and cut, and compares what is learned of them.
 """
 
 from __future__ import annotations
@@ -18,17 +19,20 @@ LEARNED = (
     "outcome", "verdicts", "tester", "trigger_time_s", "violation_time_s", "impact_speed_mps",
     "avoidable", "avoidable_ideal", "last_chance_s", "breach", "grade",
 )  # fmt: skip
+METHODS = {"search": "manoeuvres", "exposure": "monte-carlo"}  # they learn nothing
 
 
 def played(net: str, cut: bool, options: argparse.Namespace) -> tuple[Any, float]:
     """The rows of a search, and the processor time [s]."""
+    params = {"method": options.method or METHODS[options.agent], "cut": cut}
     before = processor_time()
     results = cavsumo.run(
         net,
         routes=options.routes,
         ego=options.ego,
-        agents=["search"],
-        params={"search.method": options.method, "search.cut": cut},
+        kind=options.kind,
+        agents=[options.agent],
+        params={f"{options.agent}.{key}": value for key, value in params.items()},
         testers=options.testers,
         runs=options.runs,
         seed=options.seed,
@@ -59,7 +63,9 @@ def main() -> None:
     parser.add_argument("--net", action="append", required=True)
     parser.add_argument("--ego", default="sumo")
     parser.add_argument("--routes", default="none")
-    parser.add_argument("--method", default="manoeuvres", help="one that learns nothing")
+    parser.add_argument("--agent", default="search", choices=METHODS)
+    parser.add_argument("--kind", default="pedestrian")
+    parser.add_argument("--method", help="one that learns nothing")
     parser.add_argument("--testers", type=int, default=1)
     parser.add_argument("--runs", type=int, default=200)
     parser.add_argument("--seed", type=int, default=1)

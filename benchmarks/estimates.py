@@ -4,6 +4,9 @@ The truth is a long run of Monte Carlo with its exact interval. Then each estima
 times from other seeds: its mean, how many results were refused, how often the interval meets that
 of the truth (it contains the truth itself only as well as that is known), and the gain, which is
 the variance of as many episodes of Monte Carlo over that of the estimates.
+
+With ``--estimates FILE`` each estimate is kept there, a line of JSON, and one that is there already
+is not played again; several processes may share the work by ``--first``.
 """
 
 from __future__ import annotations
@@ -50,6 +53,8 @@ def main() -> None:
     parser.add_argument("--truth", type=int, default=100_000, help="episodes")
     parser.add_argument("--kept", help="a file of benchmarks/truth, in place of playing the truth")
     parser.add_argument("--replications", type=int, default=50)
+    parser.add_argument("--first", type=int, default=FIRST_SEED, help="seed of the first one")
+    parser.add_argument("--estimates", type=Path, help="a file that keeps them")
     parser.add_argument("--episodes", type=int, default=2000, help="of an estimate")
     parser.add_argument("--method", action="append", choices=ESTIMATE_METHODS)
     parser.add_argument("--jobs", type=int, default=1)
@@ -66,8 +71,8 @@ def main() -> None:
         if method == MONTE_CARLO and truth.failed is not None:
             found = _blocks(truth, asked.episodes)[: asked.replications]
         else:
-            seeds = range(FIRST_SEED, FIRST_SEED + asked.replications)
-            found = [_estimated(asked, method, asked.episodes, seed) for seed in seeds]
+            seeds = range(asked.first, asked.first + asked.replications)
+            found = [_replication(asked, method, seed) for seed in seeds]
         print(_row(method, found, exact.p, (exact.lower, exact.upper), asked.episodes), flush=True)
 
 
@@ -77,9 +82,10 @@ def _truth(asked: argparse.Namespace) -> Truth:
         found = _estimated(asked, MONTE_CARLO, asked.truth, TRUTH_SEED)
         return Truth(asked.truth, found["simulated_s"], found["failures"])
     kept = json.loads(Path(asked.kept).read_text(encoding="utf-8"))
-    for key in ("net", "ego"):
-        if kept[key] != getattr(asked, key):
-            raise SystemExit(f"{asked.kept}: is of {key} {kept[key]}, not {getattr(asked, key)}")
+    given = {"net": Path(asked.net).name.removesuffix(".net.xml"), "ego": asked.ego}
+    for key, value in given.items():
+        if kept[key] != value:
+            raise SystemExit(f"{asked.kept}: is of {key} {kept[key]}, not {value}")
     failed = tuple(kept["failed"])
     return Truth(kept["episodes"], kept["simulated_s"], len(failed), failed)
 
@@ -99,6 +105,23 @@ def _blocks(truth: Truth, episodes: int) -> list[dict[str, Any]]:
                 "gain": {"value": 1.0},
             }
         )
+    return found
+
+
+def _replication(asked: argparse.Namespace, method: str, seed: int) -> dict[str, Any]:
+    """One estimate, from the file that keeps them if it is there."""
+    key = {"net": Path(asked.net).name, "ego": asked.ego, "method": method,
+           "episodes": asked.episodes, "seed": seed}  # fmt: skip
+    file: Path | None = asked.estimates
+    if file is not None and file.exists():
+        for line in file.read_text(encoding="utf-8").splitlines():
+            kept = json.loads(line)
+            if kept["key"] == key:
+                return dict(kept["found"])
+    found = _estimated(asked, method, asked.episodes, seed)
+    if file is not None:
+        with file.open("a", encoding="utf-8") as stream:
+            stream.write(json.dumps({"key": key, "found": found}) + "\n")
     return found
 
 

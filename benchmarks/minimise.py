@@ -4,7 +4,7 @@ Plays batches on several networks, with pedestrians and vehicles, with traffic, 
 preventable failures of each. Then, by force: every single reduction of some of the results is
 played once more; and bodies that are irrelevant are planted in some of the records.
 
-    python benchmarks/minimise.py --failures 12 --force 10 --planted 10
+    python benchmarks/minimise.py --net crossing --net FILE.net.xml --failures 12 --force 10
 """
 
 from __future__ import annotations
@@ -14,6 +14,7 @@ import dataclasses
 import statistics
 from collections.abc import Iterator
 from dataclasses import dataclass
+from itertools import product
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
@@ -25,12 +26,10 @@ from cavsumo.kept.minimising import Minimised, Replays, minimised
 from cavsumo.kept.reductions import Reductions
 
 PLANTED = 50  # bodies
+NETS = "crossing", "junction"
 SETTINGS = {
-    "crossing, pedestrians": {"net": "crossing", "agents": ["timing", "proximity"]},
-    "crossing, cars": {"net": "crossing", "kind": "car", "agents": ["timing"]},
-    "junction, pedestrians": {"net": "junction", "agents": ["timing", "proximity"]},
-    "junction, cars": {"net": "junction", "kind": "car", "agents": ["timing"]},
-    "pedestrians, pedestrians": {"net": "pedestrians", "agents": ["timing", "proximity"]},
+    "pedestrians": {"agents": ["timing", "proximity"]},
+    "cars": {"kind": "car", "agents": ["timing"]},
 }
 
 
@@ -50,10 +49,10 @@ def main() -> None:
           f"{'bodies':>12}{'segments':>12}{'seconds':>14}{'replays':>14}")  # fmt: skip
     cases: list[Case] = []
     with TemporaryDirectory() as folder:
-        for name in options.setting or SETTINGS:
-            own = list(_cases(name, options, Path(folder)))
+        for net, kind in product(options.net or NETS, options.kind or SETTINGS):
+            own = list(_cases(net, kind, options, Path(folder)))
             cases += own
-            print(_line(name, own), flush=True)
+            print(_line(named(net, kind), own), flush=True)
         print(_line("all", cases))
         chosen = cases[:: max(1, len(cases) // max(1, options.force))][: options.force]
         print(_force(chosen))
@@ -66,17 +65,23 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("--runs", type=int, default=150, help="episodes an agent of each setting")
     parser.add_argument("--force", type=int, default=10, help="results that are tried by force")
     parser.add_argument("--planted", type=int, default=5, help="records with planted bodies")
-    parser.add_argument("--setting", action="append", choices=SETTINGS, help="default: all")
+    parser.add_argument("--net", action="append", help=f"default: {', '.join(NETS)}")
+    parser.add_argument("--kind", action="append", choices=SETTINGS, help="default: all")
     parser.add_argument("--seed", type=int, default=1)
     return parser
 
 
-def _cases(name: str, options: argparse.Namespace, folder: Path) -> Iterator[Case]:
-    """Failures of a setting, made small."""
-    settings = dict(SETTINGS[name])
+def named(net: str, kind: str) -> str:
+    """The name of a setting."""
+    return f"{Path(net).name.removesuffix('.net.xml')}, {kind}"
+
+
+def _cases(net: str, kind: str, options: argparse.Namespace, folder: Path) -> Iterator[Case]:
+    """Failures of a network and a kind of testers, made small."""
+    name = named(net, kind)
     file = folder / f"{name.replace(', ', '-')}.csv"
     how = {"runs": options.runs, "seed": options.seed, "output": file, "progress": False}
-    results = cavsumo.run(settings.pop("net"), **settings, **how)
+    results = cavsumo.run(net, **SETTINGS[kind], **how)
     failures = results.failures
     runs = failures[failures["avoidable"] == 1]["run"].head(options.failures)
     for run in runs:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 import importlib
 import math
+import os
 import re
 import subprocess
 import sys
@@ -12,6 +13,7 @@ from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
+import hypothesis
 import pytest
 from inline import played_here
 from shapely.geometry import LineString, box
@@ -44,6 +46,24 @@ ROAD_LENGTH, ROAD_WIDTH, LANE_Y, PAVEMENT_Y = 99.0, 7.3, 1.825, 5.15
 
 Pose = tuple[float, float, float]  # x, y [m], o [rad]
 State = tuple[float, float, float, float]  # x, y [m], v [m/s], o [rad]
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    """Set what the tests and all their processes have in common.
+
+    Examples of hypothesis have no deadline. Each process computes in one thread: there are enough
+    processes. Where Python is told to write no bytecode, each of some hundred processes would
+    compile all that it imports; it is kept in the cache of pytest then.
+    """
+    hypothesis.settings.register_profile("untimed", deadline=None)
+    hypothesis.settings.load_profile("untimed")
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+    cache = getattr(config, "cache", None)  # None with -p no:cacheprovider
+    if sys.dont_write_bytecode and cache is not None:
+        folder = str(cache.mkdir("bytecode"))
+        os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
+        os.environ["PYTHONPYCACHEPREFIX"] = sys.pycache_prefix = folder
+        sys.dont_write_bytecode = False
 
 
 @pytest.fixture(scope="session", autouse=True)

@@ -10,16 +10,14 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, ClassVar, NamedTuple
 
-import numpy as np
-
-from cavsumo.agents.base import AGENTS, Agent
+from cavsumo.agents.base import AGENTS
 from cavsumo.agents.exposed_drives import ExposedDrive, ExposedDriver
 from cavsumo.agents.names import ESTIMATE_METHODS, EXPOSURE
-from cavsumo.agents.programme import ProgrammedWalk, WalkProgramme
+from cavsumo.agents.programme import ROUND_M, ProgrammedWalk, WalkProgramme
 from cavsumo.agents.programmed_manoeuvres import DriveProgramme
 from cavsumo.agents.recorded import start_of
-from cavsumo.model.bodies import Action
-from cavsumo.model.checks import choice, number
+from cavsumo.agents.resting import Programmed, RestingAgent
+from cavsumo.model.checks import choice, number, truth
 from cavsumo.model.scene import Scene
 from cavsumo.model.snapshot import BodyState, Snapshot
 
@@ -55,6 +53,12 @@ class ExposedWalk(ProgrammedWalk):
             if inside and crossing.signalled:
                 self._light = i
 
+    def reach(self, snapshot: Snapshot, state: BodyState) -> float:
+        """How far it may come [m]; somebody who stays never comes onto the road."""
+        if self._stays:
+            return ROUND_M + self._idle.left(state)
+        return super().reach(snapshot, state)
+
     def _due(self, snapshot: Snapshot, state: BodyState, programme: WalkProgramme) -> bool:
         """Whether it arrives now and steps off."""
         walker = self._walker
@@ -77,7 +81,7 @@ class ExposedWalk(ProgrammedWalk):
 
 
 @AGENTS.register(EXPOSURE)
-class ExposureAgent(Agent):
+class ExposureAgent(RestingAgent):
     """People who arrive and cross as an exposure says, to estimate how often the ego fails."""
 
     PARAMETERS: ClassVar[Mapping[str, str]] = {
@@ -85,10 +89,9 @@ class ExposureAgent(Agent):
         "exposure": "the exposure, a TOML file; empty for the default",
         "half_width": "relative half-width of the interval at which to end",
         "bound": "upper end of the interval at which to end; 0 for none",
+        "cut": "end an episode once the ego has left all bodies behind; false to play on",
     }
     FILES: ClassVar[tuple[str, ...]] = ("exposure",)
-    sees_background = False
-    searches = True
 
     def __init__(
         self,
@@ -96,6 +99,7 @@ class ExposureAgent(Agent):
         exposure: str | Path = "",
         half_width: float = 0.3,
         bound: float = 0.0,
+        cut: bool = True,
     ) -> None:
         self.method = choice("method", method, ESTIMATE_METHODS)
         self.exposure = str(exposure)
@@ -103,13 +107,13 @@ class ExposureAgent(Agent):
         if self.half_width == 0.0:
             raise ValueError("half_width must be above 0, got 0")
         self.bound = number("bound", bound, 0.0, 1.0)
+        self.cut = truth("cut", cut)
         self._walkers: list[ExposedPedestrian | None] = []
         self._drivers: list[ExposedDriver | None] = []
 
-    def reset(self, scene: Scene, owned: Sequence[int], rng: np.random.Generator) -> None:
-        super().reset(scene, owned, rng)
+    def _programmes_of(self, scene: Scene, owned: Sequence[int]) -> list[Programmed]:
         nobody = [None] * len(owned)
-        self._walks = [
+        return [
             ExposedDrive(scene, i, driver)
             if scene.starts[i].approach
             else ExposedWalk(scene, i, walker)
@@ -117,12 +121,6 @@ class ExposureAgent(Agent):
                 owned, self._walkers or nobody, self._drivers or nobody, strict=True
             )
         ]
-
-    def choose_action(self, snapshot: Snapshot) -> tuple[Action, ...]:
-        return tuple(
-            walk.action(snapshot, state)
-            for walk, state in zip(self._walks, self.own(snapshot), strict=True)
-        )
 
     def recall(self) -> Any:
         memory = {"starts": self.recorded_starts, "walkers": _plain(self._walkers)}

@@ -69,6 +69,12 @@ class ExposedDrive(ProgrammedDrive):
                 return NOOP
         return super().action(snapshot, state)
 
+    def reach(self, snapshot: Snapshot, state: BodyState) -> float:
+        """How far it may come [m]; one that stays waits at its line."""
+        if self._stays:
+            return max(0.0, self._to_line(state)) + AT_LINE_M
+        return super().reach(snapshot, state)
+
     def _departs(self, snapshot: Snapshot, state: BodyState, driver: ExposedDriver) -> bool:
         """Whether it would now arrive as it is drawn, or later."""
         gaining = driver.programme.gaining

@@ -31,7 +31,7 @@ AGENT_NAMES = Names(
         "run_up_m",
         "election": "distance_m rule idle manoeuvre",
         "expectiminimax": "against price_per_s grid_s top accel",
-        "exposure": "method exposure half_width bound",
+        "exposure": "method exposure half_width bound cut",
         "programmed-random": "rate_per_s epsilon idle manoeuvre",
         "proximity": "distance_m idle manoeuvre",
         "q-learning": "alpha gamma epsilon half_life hold_s weights learn",

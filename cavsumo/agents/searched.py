@@ -9,28 +9,23 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any, ClassVar
 
-import numpy as np
-
-from cavsumo.agents.base import AGENTS, Agent
+from cavsumo.agents.base import AGENTS
 from cavsumo.agents.decisions import DecidedWalk, Decision, Decisions, written
 from cavsumo.agents.drive_programme import ProgrammedDrive
 from cavsumo.agents.names import SEARCH, SEARCH_METHODS
 from cavsumo.agents.programme import ProgrammedWalk, WalkProgramme
 from cavsumo.agents.programmed_manoeuvres import DriveProgramme
 from cavsumo.agents.recorded import start_of
-from cavsumo.agents.walking import throttle_to
+from cavsumo.agents.resting import Programmed, RestingAgent
 from cavsumo.errors import UnknownName
-from cavsumo.model.bodies import Action
 from cavsumo.model.checks import truth
-from cavsumo.model.left_behind import LeftBehind
 from cavsumo.model.scene import Scene
-from cavsumo.model.snapshot import Snapshot
 
 Programme = WalkProgramme | DriveProgramme
 
 
 @AGENTS.register(SEARCH)
-class SearchAgent(Agent):
+class SearchAgent(RestingAgent):
     """Searches for preventable failures: every episode is a point of a space of tests."""
 
     PARAMETERS: ClassVar[Mapping[str, str]] = {
@@ -40,8 +35,6 @@ class SearchAgent(Agent):
         "earlier": "results of an earlier search of the same space, whose best points come first",
     }
     FILES = ("earlier",)
-    sees_background = False
-    searches = True
 
     def __init__(
         self, method: str = "portfolio", cut: bool = True, within: str = "", earlier: str = ""
@@ -51,42 +44,12 @@ class SearchAgent(Agent):
         self.method, self.within, self.earlier = method, within, earlier
         self.cut = truth("cut", cut)
         self._programmes: list[Programme | Decisions | None] = []
-        self._fellows: Sequence[SearchAgent] = ()
 
-    def reset(self, scene: Scene, owned: Sequence[int], rng: np.random.Generator) -> None:
-        super().reset(scene, owned, rng)
+    def _programmes_of(self, scene: Scene, owned: Sequence[int]) -> list[Programmed]:
         programmes = self._programmes or [None] * len(owned)
-        self._programmed = [
+        return [
             _programmed(scene, i, programme) for i, programme in zip(owned, programmes, strict=True)
         ]
-        self._behind, self._resting = LeftBehind(scene), False
-
-    def choose_action(self, snapshot: Snapshot) -> tuple[Action, ...]:
-        states, dt = self.own(snapshot), self.scene.dt
-        self._resting = self._resting or (self.cut and self._left_behind(snapshot))
-        if self._resting:
-            return tuple(Action(throttle_to(state, 0.0, dt), 0.0) for state in states)
-        return tuple(
-            one.action(snapshot, state) for one, state in zip(self._programmed, states, strict=True)
-        )
-
-    def rests(self) -> bool:
-        return self._resting
-
-    def _left_behind(self, snapshot: Snapshot) -> bool:
-        """Whether the ego has left behind all that any tester's programme still comes to."""
-        programmed = [one for agent in self._fellows or (self,) for one in agent._programmed]
-        return snapshot.sees_ego and all(
-            self._behind(snapshot, state, one.reach(snapshot, state))
-            for one in programmed
-            if (state := snapshot.testers[one.index])
-        )
-
-    @classmethod
-    def coordinate(cls, agents: Sequence[Agent], rng: np.random.Generator) -> None:
-        fellows = [agent for agent in agents if isinstance(agent, SearchAgent)]
-        for agent in fellows:
-            agent._fellows = fellows
 
     def recall(self) -> Any:
         return {

@@ -20,8 +20,7 @@ from cavsumo.agents.names import EXPOSURE
 from cavsumo.batch.jobs import Memory
 from cavsumo.batch.prepared import PreparedBatch
 from cavsumo.model.bodies import kind_named
-from cavsumo.probability.encounters import Encounters, encounters_of
-from cavsumo.probability.exposure import exposure_of
+from cavsumo.probability.encounters import Encounters, encounters_for
 from cavsumo.probability.methods import estimator
 from cavsumo.probability.protocol import Goal, PlayedVector
 from cavsumo.probability.tree import Floats
@@ -168,8 +167,8 @@ class Estimating:
 def encounters_of_batch(prepared: PreparedBatch, label: str) -> Encounters | VehicleEncounters:
     """The encounters of an agent; raises InputError where its exposure has no support."""
     scenario, member = prepared.plan.scenario, prepared.cast[label]
-    kind, exposure = kind_named(scenario.kind), exposure_of(member.params)
-    return encounters_of(prepared.site, kind, teams(scenario), exposure)
+    kind = kind_named(scenario.kind)
+    return encounters_for(member.params, prepared.site, kind, teams(scenario))
 
 
 def played_vector(row: Mapping[str, Any]) -> PlayedVector:

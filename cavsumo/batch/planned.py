@@ -17,9 +17,9 @@ from cavsumo.model.gone_settings import without_gone
 from cavsumo.model.scenario import BatchPlan, plan_from
 from cavsumo.model.study import Part
 from cavsumo.network.network_file import root_of
+from cavsumo.results.own_file import check_free
 from cavsumo.results.present import gone, present_paths
 from cavsumo.results.reading import check_replaceable, read_manifest
-from cavsumo.results.writing import check_free
 
 
 @dataclass(frozen=True)

@@ -33,8 +33,7 @@ from cavsumo.network.site import Site, Wishes
 from cavsumo.network.site_cache import site_of
 from cavsumo.network.traffic import Volume
 from cavsumo.network.traffic_lights import Pace
-from cavsumo.probability.encounters import encounters_of
-from cavsumo.probability.exposure import exposure_of
+from cavsumo.probability.encounters import encounters_for
 from cavsumo.probability.methods import check_episodes
 from cavsumo.results.present import input_files
 from cavsumo.results.provenance import checksums, traffic_checksum, unequal, versions
@@ -276,9 +275,8 @@ def _check_exposures(site: Site, kind: Kind, plan: BatchPlan, cast: Cast) -> Non
     """Refuse exposures that cannot be read, or that have no support at the site."""
     for member in cast:
         if member.name == EXPOSURE:
-            exposure = exposure_of(member.params)
             check_episodes(str(member.params.get("method")), plan.runs)
-            encounters_of(site, kind, teams(plan.scenario), exposure)
+            encounters_for(member.params, site, kind, teams(plan.scenario))
 
 
 def _check_kind(scenario: Scenario, kind: Kind, cast: Cast) -> None:

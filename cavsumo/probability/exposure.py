@@ -88,13 +88,20 @@ def read_exposure(file: Path | None = None) -> Exposure:
     except ValidationError as error:
         raise _problem(file, error) from error
     except ValueError as error:
-        raise InputError(f"exposure {str(file)!r}: {error}") from error
+        raise InputError(f"{_named(file)}: {error}") from error
 
 
-def exposure_of(params: Mapping[str, Any]) -> Exposure:
-    """The exposure that the parameters of an agent name."""
+def exposure_of(params: Mapping[str, Any]) -> tuple[Exposure, str]:
+    """The exposure that the parameters of an agent name, and its name in the sentence of an error.
+
+    Raises as ``read_exposure``.
+    """
     file = str(params.get("exposure") or "")
-    return read_exposure(Path(file) if file else None)
+    return (read_exposure(Path(file)), _named(file)) if file else (read_exposure(), "exposure")
+
+
+def _named(file: str | Path) -> str:
+    return f"exposure {str(file)!r}"
 
 
 @cache
@@ -117,7 +124,7 @@ def _over(defaults: Mapping[str, Any], given: Mapping[str, Any]) -> dict[str, An
 def _problem(file: Path, error: ValidationError) -> InputError:
     """The first problem of a file; an unknown key with the nearest one that there is."""
     problem = error.errors(include_url=False)[0]
-    where = f"exposure {str(file)!r}"
+    where = _named(file)
     if problem["type"] != "extra_forbidden":
         return InputError(f"{where}: {first_problem(error)}")
     *table, key = (str(part) for part in problem["loc"])

@@ -1,48 +1,50 @@
 """Learned shifts: normal numbers drawn around a mean that depends on the state, weighted exactly.
 
 1. Play runs whose numbers are spread wider than by chance, so that some fail.
-2. Fit m(x), linear in features of the state within each part of time, to the numbers of failing
-   runs, weighted by their likelihood ratios (cross-entropy: Rubinstein 1999, Methodol. Comput.
-   Appl. Probab. 1, 127; with proposals that depend on the state as by Delecki et al., arXiv
-   2412.02154).
-3. Play with numbers of mean m(x) and variance 1, weigh each run by its likelihood ratio
+2. Fit shifts (``shifts``) to the numbers of failing runs, weighted by their likelihood ratios.
+3. Play with the numbers of a mixture q of the shifts, weigh each run by its likelihood ratio
 
-       p / q = 1 / sum over c of  share_c exp( sum over steps of  c m . n - c^2 m . m / 2 )
+       p / q = 1 / sum over components of  share * product over steps of  N(n; m, s) / N(n; 0, 1)
 
-   and fit again; a mixture of c = 1, a smaller c and c = 0 bounds the weights.
+   and fit again, to the failing runs of the last generations together. Parts of half a shift and
+   of chance alone bound the weights.
 4. Estimate from runs of their own, which learn nothing.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 
 from cavsumo.probability.noisy import FAILED, RUNNING, NoisyProcess, SteppedEstimate
-from cavsumo.probability.tree import Floats
+from cavsumo.probability.shifts import IN_SQUARES, IN_TIME, FailingRuns, Shift, fitted, joined, latest
+from cavsumo.probability.tree import Floats, Ints
 from cavsumo.probability.weights import LEVEL, contradicts, weighted
 
-EXPLORED, LEARNED, RUNS = 4000, (2000,) * 5, 20_000  # runs of each generation, of the estimate
-KNOTS = 12  # parts of time, between which a shift is interpolated
-WIDEST = 2.5  # standard deviation of exploration, at most
-COMPONENTS = ((0.75, 1.0), (0.15, 0.6), (0.1, 0.0))  # share and c
-RIDGE, MOST = 5.0, 2.0  # rows of no shift; the largest mean of a number
-FEWEST_EFFECTIVE = (
-    60.0  # effective failing runs to learn from; weights are levelled until there are
-)
+EXPLORED, LEARNED, RUNS = 4000, (2000,) * 2 + (4000,) * 6, 40_000  # of generations, the estimate
+SPREAD = 2.5  # standard deviation of exploration, at most
+POOLED = 4  # generations from whose failing runs a shift is learned
+EFFECTIVE = {IN_TIME: 150.0, IN_SQUARES: 300.0}  # failing runs that levelled weights are worth
+SHARES = ((0.26, 1.0), (0.04, 0.5))  # of each shift: share and part of the mean
+BY_CHANCE = 0.1  # share
 
 
-@dataclass(frozen=True, eq=False)
-class Shift:
-    """The mean of the numbers: a linear function, shape (columns, numbers)."""
+class Component(NamedTuple):
+    """A part of a mixture: a part of a shift (with deviation 1 unless it is whole), or chance."""
 
-    coefficients: Floats
+    share: float
+    shift: Shift | None = None
+    part: float = 1.0
 
-    def mean(self, columns: Floats) -> Floats:
-        """The mean at some rows of ``_columns``."""
-        found: Floats = np.clip(columns @ self.coefficients, -MOST, MOST)
-        return found
+    def law(self, features: Floats, time: float) -> tuple[Floats, Floats]:
+        """Means and deviations of the numbers."""
+        if self.shift is None:
+            return np.zeros(1), np.ones(1)
+        mean = self.part * self.shift.mean(features, np.full(len(features), time))
+        return mean, self.shift.deviation(time) if self.part == 1.0 else np.ones(1)
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,17 +53,12 @@ class ShiftedRuns:
 
     Attributes:
         terms: 1{failure} p / q of each run.
-        logs: log p / q of the failing runs.
-        columns, drawn: what the mean depends on and the numbers, of all steps of failing runs.
-        owner: to which of the failing runs a row belongs.
+        failing: the steps of the failing runs.
         steps: of all runs.
     """
 
     terms: Floats
-    logs: Floats
-    columns: Floats
-    drawn: Floats
-    owner: np.ndarray
+    failing: FailingRuns
     steps: int
 
 
@@ -72,9 +69,9 @@ def estimate_by_shifts(
 
     Refused where the weights are worth few failures or it contradicts its last pilot.
     """
-    seen = [shifted_runs(process, None, EXPLORED, rng)]
+    seen = [explored_runs(process, EXPLORED, rng)]
     for count in (*LEARNED, runs):
-        seen.append(shifted_runs(process, learned_shift(process, seen), count, rng))
+        seen.append(shifted_runs(process, learned_mixture(seen), count, rng))
     pilot, found = weighted(seen[-2].terms, 0.999), weighted(seen[-1].terms, level)
     found = replace(found, episodes=sum(len(one.terms) for one in seen))
     if not found.refused and not pilot.refused and contradicts(pilot, found):
@@ -82,77 +79,90 @@ def estimate_by_shifts(
     return SteppedEstimate(found, sum(one.steps for one in seen))
 
 
-def learned_shift(process: NoisyProcess, seen: list[ShiftedRuns]) -> Shift:
-    """The mean that fits the failing runs of the last generations, by weighted ridge regression."""
-    kept = [one for one in seen[-2:] if len(one.logs)]
-    size = _columns(process, process.begin(1), 0).shape[1]
+def learned_mixture(seen: Sequence[ShiftedRuns]) -> tuple[Component, ...]:
+    """The mixture that fits the failing runs of the last generations; exploration helps once."""
+    kept = [one.failing for one in (seen[1:] or seen)[-POOLED:] if one.failing.count]
     if not kept:
-        return Shift(np.zeros((size, process.numbers)))
-    each = [_levelled(one.logs) for one in kept]
-    weights = np.concatenate([w[one.owner] for w, one in zip(each, kept, strict=True)])
-    columns = np.concatenate([one.columns for one in kept])
-    drawn = np.concatenate([one.drawn for one in kept])
-    weights *= len(weights) / weights.sum()
-    left = columns.T @ (weights[:, None] * columns) + RIDGE * np.eye(size)
-    return Shift(np.linalg.solve(left, columns.T @ (weights[:, None] * drawn)))
+        return (Component(1.0),)
+    runs = joined(kept)
+    shifts = [fitted(form, runs, effective) for form, effective in EFFECTIVE.items()]
+    shifts.append(fitted(IN_TIME, latest(runs), EFFECTIVE[IN_TIME]))
+    parts = [Component(share, one, part) for one in shifts for share, part in SHARES]
+    return (*parts, Component(BY_CHANCE))
+
+
+def explored_runs(process: NoisyProcess, count: int, rng: np.random.Generator) -> ShiftedRuns:
+    """Play runs whose numbers are spread wider than by chance, each by a factor of its own."""
+    spread = 1.0 + (SPREAD - 1.0) * rng.random(count)
+
+    def law(go: Ints, features: Floats, step: int) -> tuple[Floats, Floats]:
+        drawn = spread[go, None] * rng.standard_normal((len(go), process.numbers))
+        ratio = 0.5 * (drawn**2).sum(1) * (1.0 - spread[go] ** -2)
+        return drawn, (ratio - process.numbers * np.log(spread[go]))[None]
+
+    return _played(process, count, np.ones(1), law)
 
 
 def shifted_runs(
-    process: NoisyProcess, shift: Shift | None, count: int, rng: np.random.Generator
+    process: NoisyProcess, mixture: Sequence[Component], count: int, rng: np.random.Generator
 ) -> ShiftedRuns:
-    """Play runs with a shift; None: with numbers that are spread wider than by chance."""
-    shares, factors = np.array(COMPONENTS).T
+    """Play runs whose numbers are drawn by a mixture, as many by each component as its share."""
+    shares = np.array([one.share for one in mixture])
     own = np.searchsorted(np.cumsum(shares)[:-1], (np.arange(count) + 0.5) / count)
-    spread = 1.0 + (WIDEST - 1.0) * rng.random(count) if shift is None else np.ones(count)
+
+    def law(go: Ints, features: Floats, step: int) -> tuple[Floats, Floats]:
+        laws = [one.law(features, step / process.horizon) for one in mixture]
+        drawn = rng.standard_normal((len(go), process.numbers))
+        for number, (mean, deviation) in enumerate(laws):
+            mine = own[go] == number
+            drawn[mine] = np.broadcast_to(mean, drawn.shape)[mine] + deviation * drawn[mine]
+        return drawn, np.array([_ratio(drawn, *one) for one in laws])
+
+    return _played(process, count, shares, law)
+
+
+def _ratio(drawn: Floats, mean: Floats, deviation: Floats) -> Floats:
+    """The logarithm of a normal density over that of chance, at rows of numbers."""
+    terms = 0.5 * drawn**2 - 0.5 * ((drawn - mean) / deviation) ** 2 - np.log(deviation)
+    found: Floats = terms.sum(1)
+    return found
+
+
+def _played(
+    process: NoisyProcess,
+    count: int,
+    shares: Floats,
+    law: Callable[[Ints, Floats, int], tuple[Floats, Floats]],
+) -> ShiftedRuns:
+    """Play runs; ``law`` draws for running ones, and says log q / p of each component."""
     states, logs = process.begin(count), np.zeros((len(shares), count))
-    rows = list[tuple[np.ndarray, Floats, Floats]]()
+    rows = list[tuple[Ints, Floats, Floats]]()
     for step in range(process.horizon):
-        go = np.flatnonzero(states[:, -1] == RUNNING)
+        go: Ints = np.flatnonzero(states[:, -1] == RUNNING)
         if not len(go):
             break
-        columns = _columns(process, states[go], step)
-        mean = np.zeros((len(go), process.numbers)) if shift is None else shift.mean(columns)
-        drawn = spread[go, None] * rng.standard_normal(mean.shape)
-        drawn += factors[own[go], None] * mean
-        logs[:, go] += factors[:, None] * (mean * drawn).sum(1)
-        logs[:, go] -= factors[:, None] ** 2 * (mean**2).sum(1) / 2
-        if shift is None:  # every component is the density of the run's own spread
-            logs[:, go] += 0.5 * (drawn**2).sum(1) * (1.0 - spread[go] ** -2)
-            logs[:, go] -= process.numbers * np.log(spread[go])
-        rows.append((go, columns, drawn))
+        features = process.features(states[go])
+        drawn, ratios = law(go, features, step)
+        logs[:, go] += ratios
+        rows.append((go, features, drawn))
         states[go] = process.moved(states[go], drawn)
     failed = states[:, -1] == FAILED
     ratio = -np.logaddexp.reduce(logs + np.log(shares)[:, None], axis=0)
-    return _of_failing(failed, ratio, rows)
+    terms = np.where(failed, np.exp(np.where(failed, ratio, 0.0)), 0.0)
+    steps = sum(len(go) for go, _, _ in rows)
+    return ShiftedRuns(terms, _of_failing(failed, ratio, rows, process.horizon), steps)
 
 
 def _of_failing(
-    failed: np.ndarray, ratio: Floats, rows: list[tuple[np.ndarray, Floats, Floats]]
-) -> ShiftedRuns:
-    """Some runs, with the steps of those that failed."""
-    terms = np.where(failed, np.exp(np.where(failed, ratio, 0.0)), 0.0)
+    failed: np.ndarray, ratio: Floats, rows: list[tuple[Ints, Floats, Floats]], horizon: int
+) -> FailingRuns:
+    """The steps of those runs that failed."""
     number = np.cumsum(failed) - 1
-    kept = [(number[go[failed[go]]], c[failed[go]], d[failed[go]]) for go, c, d in rows]
-    owner, columns, drawn = (np.concatenate(parts) for parts in zip(*kept, strict=True))
-    return ShiftedRuns(
-        terms, ratio[failed], columns, drawn, owner, sum(len(go) for go, _, _ in rows)
+    kept = [(go[failed[go]], f[failed[go]], d[failed[go]]) for go, f, d in rows]
+    return FailingRuns(
+        logs=ratio[failed] - np.log(len(failed)),
+        features=np.concatenate([features for _, features, _ in kept]),
+        times=np.repeat(np.arange(len(kept)) / horizon, [len(go) for go, _, _ in kept]),
+        drawn=np.concatenate([drawn for _, _, drawn in kept]),
+        owner=number[np.concatenate([go for go, _, _ in kept])],
     )
-
-
-def _levelled(logs: Floats) -> Floats:
-    """Weights of failing runs, to the largest power at which they are worth enough of them."""
-    logs = logs - logs.max()
-    wanted = min(FEWEST_EFFECTIVE, 0.5 * len(logs))
-    for power in np.arange(1.0, 0.0, -0.05):
-        weights: Floats = np.exp(power * logs)
-        if weights.sum() ** 2 / (weights**2).sum() >= wanted:
-            return weights
-    return np.ones(len(logs))
-
-
-def _columns(process: NoisyProcess, states: Floats, step: int) -> Floats:
-    """One and the features, times how near the step is to each knot in time (0 to 1)."""
-    near = np.maximum(0.0, 1.0 - np.abs(step / process.horizon * KNOTS - np.arange(KNOTS + 1)))
-    single = np.hstack([np.ones((len(states), 1)), process.features(states)])
-    found: Floats = (near[:, None] * single[:, None, :]).reshape(len(states), -1)
-    return found

@@ -9,15 +9,12 @@ written.
 
 from __future__ import annotations
 
-import errno
-import fcntl
 import hashlib
 import json
 import os
 from collections.abc import Iterator, Mapping
 from contextlib import suppress
 from dataclasses import dataclass
-from io import FileIO
 from itertools import chain
 from pathlib import Path
 from typing import Any
@@ -26,6 +23,7 @@ from cavsumo.errors import BatchError, ResultsError
 from cavsumo.results.columns import COLUMNS, Row
 from cavsumo.results.inputs import FOLDER as INPUTS
 from cavsumo.results.inputs import keep, remove_others
+from cavsumo.results.own_file import OwnFile
 from cavsumo.results.reading import (
     FORMAT,
     HEADER,
@@ -78,18 +76,16 @@ class Recorder:
         self.traces = 0
         self.manifest: dict[str, Any] = {}
         self._begun = False
-        self._size, self._last = 0, -1  # bytes of whole rows; the last episode among them
-        self._sum, self._changed = hashlib.sha256(), 0  # of these bytes, and when written [ns]
+        self._last = -1  # the last episode among the whole rows
 
     def __enter__(self) -> Recorder:
-        self._created = not self.csv_file.exists()
-        self._file = _locked(self.csv_file)
+        self._rows = OwnFile(self.csv_file)
         return self
 
     def __exit__(self, *_: object) -> None:
-        if self._created and not self._begun:  # no batch was begun: remove the created file
+        if self._rows.created and not self._begun:  # no batch was begun: remove the created file
             self.csv_file.unlink(missing_ok=True)
-        self._file.close()
+        self._rows.close()
 
     def begin(self, manifest: Mapping[str, Any], *, overwrite: bool = False) -> None:
         """Start a batch in place of a finished one; raises ResultsError if that fails.
@@ -102,13 +98,9 @@ class Recorder:
             self.manifest = dict(manifest)
             self._write_manifest(STARTING)
             self._begun = True
-            self._file.truncate(0)
-            self._remove_traces(after=-1)
             self._start_rows()
         except OSError as error:
-            raise ResultsError(
-                f"results {str(self.csv_file)!r}: cannot be written: {error.strerror}"
-            ) from error
+            raise self._cannot_start(error) from error
 
     def keep(self, files: Mapping[str, Path]) -> list[Path]:
         """Keep the inputs of the batch, by their checksums; returns those that are too large."""
@@ -138,9 +130,8 @@ class Recorder:
     def resume_after(self, manifest: Mapping[str, Any], written: Written) -> None:
         """Continue after rows that were read and checked already, else like ``resume``."""
         inside(self.csv_file, self.trace_folder.name)
-        self._size, self._sum, self._last = written.size, written.sum.copy(), written.last
-        self.traces = written.traces
-        self._note(b"")
+        self._rows.adopt(written.size, written.sum)
+        self._last, self.traces = written.last, written.traces
         self._go_on(manifest)
 
     def _go_on(self, manifest: Mapping[str, Any]) -> None:
@@ -148,19 +139,15 @@ class Recorder:
         try:
             self._begun = True
             self.manifest = {k: v for k, v in manifest.items() if k not in _FRAME}
-            self._file.truncate(self._size)
-            self._remove_traces(after=self._last)
             self._start_rows()
         except OSError as error:
-            raise ResultsError(
-                f"results {str(self.csv_file)!r}: cannot be written: {error.strerror}"
-            ) from error
+            raise self._cannot_start(error) from error
 
     _has_folder = False  # whether there may be files beside the rows
 
     def write(self, outcome: Outcome) -> Row:
         """Append a row, its trace first; raises BatchError when the disk takes no more."""
-        self._check_own()
+        self._rows.check()
         row = self._with_trace(outcome)
         self._append(_line(row), row["run"])
         return row
@@ -170,48 +157,34 @@ class Recorder:
 
         ``last``: the number of the last of them.
         """
-        self._check_own()
+        self._rows.check()
         self._append(lines, last)
 
     def _append(self, lines: bytes, last: int) -> None:
         """Append lines; none of them stays when the disk takes no more."""
         try:
-            _write_all(self._file, lines)
+            self._rows.append(lines)
         except OSError as error:
-            self._file.truncate(self._size)
-            self._note(b"")
             raise self._no_more(error) from error
-        self._note(lines)
         self._last = last
 
     def replace(self, outcomes: Mapping[int, Outcome]) -> None:
         """Replace some rows, all at once or not at all."""
-        self._check_own()
+        self._rows.check()
         rows = {run: self._with_trace(outcome) for run, outcome in outcomes.items()}
-        new_file = self.csv_file.with_name(f".{self.csv_file.name}.new")
-        new_file.unlink(missing_ok=True)
-        new = _locked(new_file)
+
+        def line(old: bytes) -> bytes:
+            row = rows.get(int(old.split(b",", 1)[0]))
+            return old if row is None else _line(row)
+
         try:
-            with self.csv_file.open("rb") as old, new_file.open("wb") as stream:
-                stream.write(old.readline())
-                for line in old:
-                    row = rows.get(int(line.split(b",", 1)[0]))
-                    stream.write(line if row is None else _line(row))
-                stream.flush()
-                os.fsync(stream.fileno())
-            new_file.replace(self.csv_file)
+            self._rows.replace(line)
         except OSError as error:
-            new.close()
-            new_file.unlink(missing_ok=True)
             raise self._no_more(error) from error
-        self._file.close()
-        self._file = new
-        self._size, self._sum = 0, hashlib.sha256()
-        self._note(self.csv_file.read_bytes())
 
     def checkpoint(self, facts: Mapping[str, Any]) -> None:
         """Record facts in the manifest of the running batch."""
-        self._check_own()
+        self._rows.check()
         self.manifest.update(facts)
         try:
             self._write_manifest(RUNNING)
@@ -220,10 +193,10 @@ class Recorder:
 
     def finish(self, status: str, facts: Mapping[str, Any]) -> None:
         """Make the rows durable and complete the manifest."""
-        self._check_own()
+        self._rows.check()
         self.manifest.update(facts)
         try:
-            os.fsync(self._file.fileno())
+            self._rows.flush()
             self._write_manifest(status)
         except OSError as error:
             raise self._no_more(error) from error
@@ -272,45 +245,16 @@ class Recorder:
                 self._last = int(row["run"])
                 self.traces += bool(row["trace"])
                 yield row
-            self._note(line)
+            self._rows.note(line)
 
     def _start_rows(self) -> None:
-        """Be ready for the next row, the header before the first."""
+        """Be ready for the row behind the whole ones, the header before the first."""
+        self._rows.truncate()
+        self._remove_traces(after=self._last)
         self._has_folder = self.trace_folder.is_dir()
-        if not self._size:
-            _write_all(self._file, HEADER.encode("utf-8"))
-            self._note(HEADER.encode("utf-8"))
-        self._changed = os.fstat(self._file.fileno()).st_mtime_ns
+        if not self._rows.size:
+            self._rows.append(HEADER.encode("utf-8"))
         self._write_manifest(RUNNING)
-
-    def _note(self, data: bytes) -> None:
-        """Note bytes that this process has appended to the file."""
-        self._size += len(data)
-        self._sum.update(data)
-        self._changed = os.fstat(self._file.fileno()).st_mtime_ns
-
-    def _check_own(self) -> None:
-        """Raise BatchError unless the results file is there, and as we wrote it."""
-        ours = os.fstat(self._file.fileno())
-        try:
-            there = self.csv_file.stat()
-        except OSError:
-            raise self._interfered("was removed") from None
-        if not os.path.samestat(ours, there):
-            raise self._interfered("was replaced by another file")
-        if there.st_size != self._size:
-            raise self._interfered(f"has {there.st_size} bytes where {self._size} were written")
-        if there.st_mtime_ns != self._changed:
-            if hashlib.sha256(self.csv_file.read_bytes()).digest() != self._sum.digest():
-                raise self._interfered("was changed")
-            self._changed = there.st_mtime_ns
-
-    def _interfered(self, what: str) -> BatchError:
-        """The error for results that another process has changed."""
-        return BatchError(
-            f"results {str(self.csv_file)!r}: the file {what} while the batch was written; nothing "
-            "more is written"
-        )
 
     def _remove_traces(self, after: int) -> None:
         """Remove the traces and logs of later episodes, and nothing else."""
@@ -334,6 +278,10 @@ class Recorder:
             new.unlink(missing_ok=True)
             raise
 
+    def _cannot_start(self, error: OSError) -> ResultsError:
+        """The error for a file that takes nothing."""
+        return ResultsError(f"results {str(self.csv_file)!r}: cannot be written: {error.strerror}")
+
     def _no_more(self, error: OSError) -> BatchError:
         """The error for a full disk."""
         return BatchError(
@@ -345,35 +293,6 @@ class Recorder:
 _FRAME = ("format", "status", "columns")  # keys that the recorder itself adds to a manifest
 
 
-def check_free(csv_file: Path) -> None:
-    """Raise ResultsError if another run is writing these results; changes nothing."""
-    if csv_file.is_file():
-        _locked(csv_file).close()
-
-
-def _locked(file: Path) -> FileIO:
-    """A file opened for writing, created if need be and locked until it is closed."""
-    try:
-        stream = file.open("ab", buffering=0)  # every row is one write at the end
-    except OSError as error:
-        raise ResultsError(f"results {str(file)!r}: cannot be written: {error.strerror}") from error
-    try:
-        fcntl.flock(stream, fcntl.LOCK_EX | fcntl.LOCK_NB)
-    except OSError as error:
-        stream.close()
-        if error.errno in (errno.EAGAIN, errno.EACCES):
-            raise ResultsError(f"results {str(file)!r}: another run is writing them") from error
-        raise ResultsError(f"results {str(file)!r}: no lock: {error.strerror}") from error
-    return stream
-
-
 def _line(row: Row) -> bytes:
     """A row as it stands in the file."""
     return row_line(row).encode("utf-8", errors=UNENCODABLE)
-
-
-def _write_all(file: FileIO, data: bytes) -> None:
-    """Write all of it; the system may take it in parts."""
-    left = memoryview(data)
-    while left:
-        left = left[file.write(left) :]

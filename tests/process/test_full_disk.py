@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import subprocess
 import sys
 from collections.abc import Mapping
@@ -42,6 +43,8 @@ def test_two_recorders_never_write_one_file(file: Path) -> None:
     assert subprocess.run([sys.executable, "-c", code]).returncode == 0
 
 
+UNCOMPILED = {**os.environ, "PYTHONDONTWRITEBYTECODE": "1"}  # it would be cut, and kept, too
+
 FULL = """
 import resource, sys
 from pathlib import Path
@@ -68,7 +71,7 @@ with Recorder(file) as recorder:
 def test_a_full_disk_leaves_whole_rows(file: Path, what: str) -> None:
     """The disk takes part of a row, or of a trace: one sentence, and no part of it stays."""
     words = [sys.executable, "-c", FULL, str(file), what]
-    done = subprocess.run(words, capture_output=True, text=True)
+    done = subprocess.run(words, env=UNCOMPILED, capture_output=True, text=True)
     assert done.returncode == 0, done.stderr
     failed, _, said = done.stdout.partition(" ")
     assert "cannot be written: File too large; the rows before are whole" in said
@@ -101,11 +104,13 @@ def test_a_full_disk_ends_a_run_with_one_sentence(
 ) -> None:
     """Exit 3 and no traceback; with room again --resume gives the rows of an undisturbed run."""
     words = ["run", "-n", str(networks["pedestrians"]), "-r", "none", "--end", "1", "-q"]
-    words += ["--agent", "noop", "--testers", "1", "--runs", "120", "--trace", "none"]
+    words += ["--agent", "noop", "--testers", "1", "--runs", "60", "--trace", "none"]
 
     def limited(limit: int, *more: str) -> subprocess.CompletedProcess[str]:
         line = [sys.executable, "-c", LIMITED, str(limit), *words, *more]
-        return subprocess.run(line, cwd=tmp_path, capture_output=True, text=True, timeout=120)
+        return subprocess.run(
+            line, cwd=tmp_path, env=UNCOMPILED, capture_output=True, text=True, timeout=120
+        )
 
     done = limited(8_000)
     assert done.returncode == 3, done.stderr
@@ -114,12 +119,12 @@ def test_a_full_disk_ends_a_run_with_one_sentence(
     file = tmp_path / "results.csv"
     assert file.read_bytes().endswith(b"\n")
     kept = read_rows(file)
-    assert 0 < len(kept) < 120
+    assert 0 < len(kept) < 60
     assert read_manifest(file)["status"] == "broken"
     assert limited(10_000_000, "--resume").returncode == 0
     rows = read_rows(file)
     assert rows[: len(kept)] == kept
-    assert [int(row["run"]) for row in rows] == list(range(120))
+    assert [int(row["run"]) for row in rows] == list(range(60))
 
 
 FULL_AT_ONCE = """
@@ -140,7 +145,7 @@ except ResultsError as error:
 def test_a_disk_full_from_the_start_is_one_sentence(file: Path) -> None:
     """Not even the manifest fits: refused by name, and nothing half there is left."""
     words = [sys.executable, "-c", FULL_AT_ONCE, str(file)]
-    done = subprocess.run(words, capture_output=True, text=True)
+    done = subprocess.run(words, env=UNCOMPILED, capture_output=True, text=True)
     assert done.returncode == 0, done.stderr
     assert "cannot be written: File too large" in done.stdout
     assert content(file.parent) == {}

@@ -113,5 +113,5 @@ def test_nothing_runs_after_a_batch(large: Path) -> None:
     plan = plan_from({"net": str(large), "end": 3.0}, "test")
     prepared = prepare(plan)
     with opened(Means(jobs=2)) as (executor, _):
-        list(executor.map(play, [prepared] * 6, [job(plan, run) for run in range(6)]))
+        list(executor.map(play, [prepared] * 4, [job(plan, run) for run in range(4)]))
     assert descendants(os.getpid()) == before

@@ -181,7 +181,7 @@ def test_sweeping_and_making_at_once_disturb_nobody(here: Path) -> None:
     for thread in threads:
         thread.start()
     try:
-        for _ in range(200):
+        for _ in range(100):
             folder = OwnFolder("worker")
             assert (Path(folder.name) / MARK).exists()
             folder.close()

@@ -25,7 +25,8 @@ def learned(
     """A batch of both learners, and the certificate of what one of them did."""
     folder = tmp_path_factory.mktemp("learned")
     words = ["run", "-n", str(networks["pedestrians"]), "-r", "none", "--end", "8", "--runs", "3"]
-    words += ["--agent", "q-learning", "--agent", "best-response", "--param", "explore=1"]
+    words += ["--agent", "q-learning", "--agent", "best-response", "--param", "explore=2"]
+    words += ["--param", "best-response.aim=violation"]  # one plan for all bodies
     words += ["--param", "replan=1", "--testers", "2", "--trace", "all"]
     file = folder / "found.csv"
     assert main([*words, "-o", str(file), *QUIET]) == 0

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import shutil
 from pathlib import Path
 from typing import Any
 
@@ -26,11 +27,20 @@ def _estimate(file: Path, *more: str, most: int = MOST) -> int:
     return main([*words, *more])
 
 
+FAST = """
+[speed_mps]
+distribution = "normal"
+mean = 9.0
+sd = 0.1
+"""
+
+
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A folder with an exposure under which an ego that never brakes fails often."""
+    """A folder with two exposures: an ego that never brakes fails often, and nobody can walk."""
     found = tmp_path_factory.mktemp("estimate")
     (found / "often.toml").write_text(OFTEN, encoding="utf-8")
+    (found / "fast.toml").write_text(FAST, encoding="utf-8")
     return found
 
 
@@ -42,13 +52,15 @@ def found(folder: Path) -> Path:
     return file
 
 
-def test_digits_do_not_depend_on_how_it_is_played(found: Path, folder: Path) -> None:
+def test_digits_do_not_depend_on_how_it_is_played(
+    found: Path, folder: Path, tmp_path: Path
+) -> None:
     """Two at a time; and cut off in the middle of a generation and continued."""
     often = "--exposure", str(folder / "often.toml")
-    both, parts = folder / "both.csv", folder / "parts.csv"
+    both = folder / "both.csv"
     assert _estimate(both, "-q", "-j", "2", *often) == Exit.OK
     assert rows(both) == rows(found)
-    assert _estimate(parts, "-q", *often) == Exit.OK
+    parts = shutil.copytree(folder, tmp_path / "cut") / found.name
     kept = parts.read_bytes().splitlines(keepends=True)[: 1 + 17]
     parts.write_bytes(b"".join(kept))
     assert estimated(parts).refused == "it was cut short; --resume goes on"
@@ -191,6 +203,10 @@ def test_vehicles_meet_the_ego(kind: str, tmp_path: Path, capsys: Capture) -> No
         (["--bound", "1.5"], "--bound: expected a probability between 0 and 1, got 1.5"),
         (["--method", "splitting"], "argument --method: invalid choice: 'splitting'"),
         (["--exposure", "none.toml"], "none.toml"),
+        (
+            ["--exposure", "fast.toml"],
+            "fast.toml': speed_mps: expected a distribution with mass bet",
+        ),
         (["--agent", "timing"], "--agent: expected none"),
         (["--picture", "a.gif"], "--picture 'a.gif': expected a name that ends in .svg or .png"),
         (["--against", "sumo", "--method", "importance"], "--against: needs --method monte-carlo"),
@@ -200,9 +216,15 @@ def test_vehicles_meet_the_ego(kind: str, tmp_path: Path, capsys: Capture) -> No
     ],
 )
 def test_an_estimate_that_is_impossible_is_refused(
-    words: list[str], said: str, tmp_path: Path, capsys: Capture
+    words: list[str],
+    said: str,
+    folder: Path,
+    tmp_path: Path,
+    capsys: Capture,
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     """One sentence, and nothing is written."""
+    monkeypatch.chdir(folder)  # exposures
     assert _estimate(tmp_path / "no.csv", "-q", *words) == Exit.USAGE
     assert said in capsys.readouterr().err
     assert not list(tmp_path.iterdir())

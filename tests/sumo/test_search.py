@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import json
+import shutil
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -41,12 +42,11 @@ def _point(file: Path, row: dict[str, str]) -> Any:
     return read_trace(file.parent / row["trace"]).head["memory"]
 
 
-def _halves(whole: Path, half: Path, *more: str) -> None:
+def _continued(whole: Path, folder: Path, *more: str, runs: int = RUNS) -> None:
     """The same search, killed in the middle of a generation and continued, two at a time."""
-    _search(half, *more)
-    kept = half.read_bytes().splitlines(keepends=True)[: 1 + 13]
-    half.write_bytes(b"".join(kept))
-    assert _search(half, "--resume", "-j", "2", *more) in (Exit.OK, Exit.VIOLATED)
+    half = shutil.copytree(whole.parent, folder) / whole.name
+    half.write_bytes(b"".join(half.read_bytes().splitlines(keepends=True)[: 1 + 13]))
+    assert _search(half, "--resume", "-j", "2", *more, runs=runs) in (Exit.OK, Exit.VIOLATED)
     assert rows(half) == rows(whole)
 
 
@@ -60,19 +60,19 @@ def found(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 def test_rows_do_not_depend_on_how_it_is_played(found: Path, tmp_path: Path) -> None:
     """Two at a time; and stopped in the middle of a generation and continued."""
-    both, parts = (_folder(tmp_path / name) for name in ("both", "parts"))
+    both = _folder(tmp_path / "both")
     assert _search(both, "-j", "2") == Exit.VIOLATED
     assert rows(both) == rows(found)
     assert traces(both) == traces(found)
-    _halves(found, parts)
+    _continued(found, tmp_path / "parts")
 
 
 @pytest.mark.parametrize("method", ["tree", "explore", "diversity"])
 def test_every_searcher_is_continued_from_its_rows(method: str, tmp_path: Path) -> None:
     """Its state is what it was told, in the order of the episodes; a row says how it is played."""
-    whole, half = (_folder(tmp_path / name) for name in ("whole", "half"))
-    _search(whole, "--method", method)
-    _halves(whole, half, "--method", method)
+    whole = _folder(tmp_path / "whole")
+    _search(whole, "--method", method, runs=24)
+    _continued(whole, tmp_path / "half", "--method", method, runs=24)
     played = rows(whole)
     decided = [row["situations"] for row in played if row["situations"]]
     assert bool(decided) is (method != "diversity")
@@ -138,7 +138,7 @@ def test_an_episode_ends_when_nobody_can_meet_the_ego(tmp_path: Path, capsys: Ca
     """Outcomes and grades are those of the whole episodes; that the ego arrived is not known."""
     files = tmp_path / "cut.csv", tmp_path / "whole.csv"
     for file, words in zip(files, ([], ["--param", "cut=false"]), strict=True):
-        _search(file, "--method", "random", "--trace", "all", *words)
+        _search(file, "--method", "random", "--trace", "all", *words, runs=16)
     cut, whole = map(rows, files)
     learned = "outcome", "verdicts", "avoidable", "impact_speed_mps", "trigger_time_s", "grade"
     assert [[r[c] for c in learned] for r in cut] == [[r[c] for c in learned] for r in whole]
@@ -158,9 +158,9 @@ def test_a_search_begins_with_what_an_earlier_one_found(
 ) -> None:
     """Its best points are played first; decisions are no points of a search by programmes."""
     earlier = ["--param", f"search.earlier={found}", "--method", method]
-    whole, half = (_folder(tmp_path / name) for name in ("whole", "half"))
-    assert _search(whole, *earlier) == Exit.VIOLATED
-    _halves(whole, half, *earlier)
+    whole = _folder(tmp_path / "whole")
+    assert _search(whole, *earlier, runs=24) == Exit.VIOLATED
+    _continued(whole, tmp_path / "half", *earlier, runs=24)
     first, best = rows(whole)[0], max(rows(found), key=lambda row: float(row["grade"]))
     assert bool(first["situations"]) is (method == "explore")
     assert method == "explore" or _point(whole, first) == _point(found, best)
@@ -252,9 +252,9 @@ def test_another_space_is_not_continued(
 def test_a_bounded_search_is_continued(tmp_path: Path) -> None:
     """All bodies come from one side, slowly; the same rows after an interruption."""
     bounds = "--param", "search.within=side=left speed=0.3:0.6", "--exit-zero"
-    whole, half = (_folder(tmp_path / name) for name in ("whole", "half"))
-    assert _search(whole, *bounds) == 0
-    _halves(whole, half, *bounds)
+    whole = _folder(tmp_path / "whole")
+    assert _search(whole, *bounds, runs=24) == 0
+    _continued(whole, tmp_path / "half", *bounds, runs=24)
     met = [row for row in rows(whole) if row["from_side"]]
     assert {row["from_side"] for row in met} <= {"left"}
     assert met

@@ -66,7 +66,7 @@ def by_areas(first: Numbers, second: Numbers, times: Numbers) -> float:
     both = [outlines(first), outlines(second)]
     swept = []
     for boxes in both:
-        some = boxes[::20]
+        some = boxes[::10]
         pairs = shapely.union_all(np.stack([some[:-1], some[1:]]), axis=0)
         swept.append(shapely.union_all(shapely.convex_hull(pairs)))
     area = shapely.intersection(*swept)
@@ -96,6 +96,7 @@ def by_strips(angle: float, sizes: Any, speeds: Any, whens: Any) -> float:
 ANGLES = [30, 45, 60, 75, 90, 120, 135, 150]
 CARS = ((4.5, 1.75), (4.5, 1.75))
 MIXED = ((4.5, 1.75), (0.65625, 0.875))
+DENSE_S = 0.002
 
 
 @pytest.mark.parametrize("sizes", [CARS, MIXED])
@@ -104,7 +105,7 @@ def test_straight_ways_of_any_angle(degrees: float, sizes: Any) -> None:
     """Exact whatever the timestep, and whoever comes first."""
     angle = math.radians(degrees)
     for (v, w), late, dt in itertools.product(
-        ((4.0, 10.0), (7.3, 5.1), (10.0, 4.0)), (-5.5, 3.3, 4.7), (0.1, 0.04)
+        ((4.0, 10.0), (7.3, 5.1), (10.0, 4.0)), (-5.5, 3.3), (0.1, 0.04)
     ):
         times = np.arange(0.0, SPAN_S + 1e-9, dt)
         first = tracks(straight(0.0, v, MEETING_S), times, sizes[0])
@@ -116,14 +117,14 @@ def test_straight_ways_of_any_angle(degrees: float, sizes: Any) -> None:
 
 @pytest.mark.parametrize("degrees", ANGLES)
 def test_the_strips_are_what_the_boxes_sweep(degrees: float) -> None:
-    """The two ways to the answer, which know nothing of pieces, agree to their millisecond."""
-    angle, times = math.radians(degrees), np.arange(0.0, SPAN_S, 0.001)
+    """The two ways to the answer, which know nothing of pieces, agree to their 2 milliseconds."""
+    angle, times = math.radians(degrees), np.arange(0.0, SPAN_S, DENSE_S)
     first = tracks(straight(0.0, 8.0, MEETING_S), times, CARS[0])
     second = tracks(straight(angle, 6.0, MEETING_S + 4.0), times, CARS[1])
     exact = by_strips(angle, CARS, (8.0, 6.0), (MEETING_S, MEETING_S + 4.0))
     assert exact > 0.5
     assert by_areas(first, second, times) == pytest.approx(exact, abs=0.003)
-    coarse = slice(None, None, 100)
+    coarse = slice(None, None, 50)
     found = pet_tracks(times[coarse], first[coarse], second[coarse])
     assert found == pytest.approx(exact, abs=1e-9)
 
@@ -135,7 +136,7 @@ def test_the_strips_are_what_the_boxes_sweep(degrees: float) -> None:
 )
 def test_ways_that_bend(degrees: float, radius: float, sizes: Any) -> None:
     """A body on a circle across a straight way, as dense outlines have it."""
-    times = np.arange(0.0, SPAN_S, 0.001)
+    times = np.arange(0.0, SPAN_S, DENSE_S)
     turning = arc(math.radians(degrees), 5.0, MEETING_S + 3.5, radius)
     # It comes to stand on the circle before that leads along the other way, and across it again.
     passes = np.clip(times, MEETING_S + 3.5 - 1.3, MEETING_S + 3.5 + 1.3)
@@ -143,7 +144,7 @@ def test_ways_that_bend(degrees: float, radius: float, sizes: Any) -> None:
     second = tracks(turning, passes, sizes[1])
     dense = by_areas(first, second, times)
     assert dense > 0.5
-    found = pet_tracks(times[::100], first[::100], second[::100])
+    found = pet_tracks(times[::50], first[::50], second[::50])
     assert found == pytest.approx(dense, abs=0.03)
 
 

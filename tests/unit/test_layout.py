@@ -8,6 +8,7 @@ import sys
 import tomllib
 from collections import defaultdict
 from collections.abc import Iterable, Iterator, Mapping
+from functools import cache
 from pathlib import Path
 
 import cavsumo
@@ -61,12 +62,17 @@ def sources() -> dict[str, Path]:
 
 
 SOURCES = sources()
-TREES = {name: ast.parse(file.read_text(encoding="utf-8")) for name, file in SOURCES.items()}
+
+
+@cache
+def trees() -> dict[str, ast.Module]:
+    """Every module of the package, parsed."""
+    return {name: ast.parse(file.read_text(encoding="utf-8")) for name, file in SOURCES.items()}
 
 
 def imported(module: str) -> Iterator[str]:
     """The full names of all modules that a module imports, inside functions too."""
-    for node in ast.walk(TREES[module]):
+    for node in ast.walk(trees()[module]):
         if isinstance(node, ast.Import):
             yield from (alias.name for alias in node.names)
         elif isinstance(node, ast.ImportFrom):
@@ -170,7 +176,7 @@ def test_only_the_boundary_imports_sumo() -> None:
 def test_a_class_name_has_one_meaning() -> None:
     """No two classes of the package have the same name."""
     places: dict[str, list[str]] = defaultdict(list)
-    for module, tree in TREES.items():
+    for module, tree in trees().items():
         for node in ast.walk(tree):
             if isinstance(node, ast.ClassDef):
                 places[node.name].append(module)
@@ -180,7 +186,7 @@ def test_a_class_name_has_one_meaning() -> None:
 def test_every_room_says_what_lives_there() -> None:
     """Ten lines at most: what lives there, what does not, where to add one more."""
     for name in ROOMS:
-        text = ast.get_docstring(TREES[name])
+        text = ast.get_docstring(trees()[name])
         assert text, name
         assert len(text.splitlines()) <= 10, name
 
@@ -188,7 +194,7 @@ def test_every_room_says_what_lives_there() -> None:
 def docstrings() -> Iterator[tuple[str, str]]:
     """Every docstring of the package with the name of its module."""
     kinds = (ast.Module, ast.ClassDef, ast.FunctionDef, ast.AsyncFunctionDef)
-    for module, tree in TREES.items():
+    for module, tree in trees().items():
         for node in ast.walk(tree):
             if isinstance(node, kinds) and (text := ast.get_docstring(node)):
                 yield module, text

@@ -179,7 +179,7 @@ def test_quantiles_have_the_mean_of_their_distribution(
         ('[speed_mps]\ndistribution = "cauchy"', "speed_mps: "),
         (
             '[speed_mps]\ndistribution = "histogram"\nedges = [0, 1]\nshares = [0.9]',
-            "shares: expected a sum of 1, got 0.9",
+            "speed_mps.histogram: shares: expected a sum of 1, got 0.9",
         ),
         (
             '[critical_gap_s]\ndistribution = "normal"\nmean = 1\nsd = 0.1\nlow = 9.0',
@@ -196,6 +196,7 @@ def test_a_wrong_exposure_is_refused(text: str, said: str, tmp_path: Path) -> No
         read_exposure(file)
     assert str(error.value).startswith(f"exposure {str(file)!r}: ")
     assert said in str(error.value)
+    assert str(error.value).count(", got ") <= 1
 
 
 def test_an_exposure_keeps_the_defaults_that_it_leaves_out(tmp_path: Path) -> None:

@@ -38,10 +38,15 @@ def gone_on(file: Path, content: bytes, resume: Callable[[Recorder], Tally]) -> 
     file.write_bytes(content)
     with Recorder(file) as recorder:
         tally = resume(recorder)
-        own = {name: vars(recorder)[name] for name in ("_size", "_last", "traces", "manifest")}
-        recorder._check_own()
+        own = {name: vars(recorder)[name] for name in ("_last", "traces", "manifest")}
+        recorder._rows.check()
         left, counts = file.read_bytes(), repr(vars(tally))  # as text nan is like nan
-        return own | {"sum": recorder._sum.hexdigest(), "left": left, "counts": counts}
+        return own | {
+            "size": recorder._rows.size,
+            "sum": recorder._rows.sum.hexdigest(),
+            "left": left,
+            "counts": counts,
+        }
 
 
 @pytest.mark.parametrize("name", CHANGES)
