@@ -46,7 +46,7 @@ ESMINI = (
     "--logfile_path log.txt"
 )
 STEP_S = {"recorded": "0.01", "test": "0.05"}  # of esmini
-CELLS = {"x": 11, "y": 12, "heading": 24}  # behind the cell with the name of a body
+CELLS = 11, 12, 24  # with x, y and heading, behind the cell with the name of a body
 OF_A_BODY = 31  # cells
 
 
@@ -210,29 +210,18 @@ def play(folder: Path, esmini: str, step_s: str = STEP_S["recorded"]) -> Played:
     words = [esmini, *ESMINI.split(), "--fixed_timestep", step_s]
     subprocess.run(words, cwd=folder, capture_output=True, timeout=200, check=True)
     east, north = _offset(folder / "test.xodr")
-    return {time: {name: (x - east, y - north, o) for name, x, y, o in bodies}
+    return {time: {name: (x - east, y - north, o) for name, (x, y, o) in bodies.items()}
             for time, bodies in _rows(folder / "out.csv")}  # fmt: skip
 
 
-def _rows(file: Path) -> Iterator[tuple[int, list[tuple[str, float, float, float]]]]:
-    """The rows of esmini's table."""
-    x, y, heading = CELLS.values()
+def _rows(file: Path) -> Iterator[tuple[int, dict[str, list[float]]]]:
+    """The rows of esmini's table: the time, and the places of all bodies by their names."""
     with file.open(encoding="utf-8") as stream:
         for row in csv.reader(stream, skipinitialspace=True):
             if len(row) > OF_A_BODY and row[0].isdecimal():
-                at = range(2, len(row) - heading, OF_A_BODY)
-                yield (
-                    round(100 * float(row[1])),
-                    [
-                        (
-                            row[i].strip(),
-                            float(row[i + x]),
-                            float(row[i + y]),
-                            float(row[i + heading]),
-                        )
-                        for i in at
-                    ],
-                )
+                at = range(2, len(row) - CELLS[-1], OF_A_BODY)
+                bodies = {row[i].strip(): [float(row[i + cell]) for cell in CELLS] for i in at}
+                yield round(100 * float(row[1])), bodies
 
 
 def _offset(file: Path) -> tuple[float, float]:

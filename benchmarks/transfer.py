@@ -41,7 +41,8 @@ def failures(folder: Path, wanted: int, runs: int, jobs: int) -> list[Path]:
 
 def transferable(tests: Sequence[Path]) -> list[Path]:
     """The tests that have a relative form; the others are named."""
-    from cavsumo.kept.transfer import TransferOrder, transfer_parts
+    from cavsumo.kept.transfer import transfer_parts
+    from cavsumo.kept.transfer_order import TransferOrder
 
     kept = []
     for test in tests:

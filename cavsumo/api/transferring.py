@@ -11,9 +11,8 @@ from cavsumo.api.results import Results
 from cavsumo.api.running import Order, means_of, results_of
 from cavsumo.batch.manner import Manner
 from cavsumo.batch.progress import is_shown
-from cavsumo.errors import UnknownName
-from cavsumo.kept.transfer import TransferOrder, transfer_parts
-from cavsumo.kept.transfer_form import FORMS
+from cavsumo.kept.transfer import transfer_parts
+from cavsumo.kept.transfer_order import FORMS, TransferOrder
 from cavsumo.kept.transferred import transferred
 
 if TYPE_CHECKING:
@@ -74,20 +73,17 @@ def transfer(
     """
     import pandas
 
-    for form in forms:
-        if form not in FORMS:
-            raise UnknownName("form", form, FORMS, "transfer")
     given, objects = settings_of(None, {} if ego is None else {"ego": ego})
     order = TransferOrder(
         [os.fspath(one) for one in tests],
         [os.fspath(one) for one in nets],
-        given.get("ego"),
-        dict(ego_params or {}),
-        places,
-        seeds,
-        seed,
-        forms,
-        trust,
+        ego=given.get("ego"),
+        ego_params=dict(ego_params or {}),
+        places=places,
+        seeds=seeds,
+        seed=seed,
+        forms=forms,
+        trust=trust,
     )
     parts = transfer_parts(order)
     manner = Manner(resume, overwrite=overwrite, quiet=not (progress and is_shown()))

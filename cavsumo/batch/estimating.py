@@ -9,14 +9,15 @@ from __future__ import annotations
 
 import math
 import zlib
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from cavsumo.agents.casting import teams
 from cavsumo.agents.names import EXPOSURE
+from cavsumo.assertions.judgement import UNFAIR, VIOLATED
 from cavsumo.batch.jobs import Memory
 from cavsumo.batch.prepared import PreparedBatch
 from cavsumo.model.bodies import kind_named
@@ -26,10 +27,26 @@ from cavsumo.probability.protocol import Goal, PlayedVector
 from cavsumo.probability.tree import Floats
 from cavsumo.probability.vehicle_encounters import VehicleEncounters
 from cavsumo.probability.weights import Estimate
-from cavsumo.results.failures import graded
+from cavsumo.results.failures import ORDER, graded, violations
 from cavsumo.results.rows import cell
 
 BEYOND = 10  # vectors that are drawn together after the end of an estimate
+
+
+class EventEstimate(NamedTuple):
+    """The probability that an assertion is violated, or that it is in one of the ways of failures.
+
+    Attributes:
+        assertion: its name.
+        kind: violated, preventable, not judged, unpreventable or unfair.
+        episodes: in how many it happened, pilots included.
+        found: the estimate.
+    """
+
+    assertion: str
+    kind: str
+    episodes: int
+    found: Estimate
 
 
 @dataclass(frozen=True)
@@ -44,6 +61,7 @@ class EstimateFacts:
         errors: episodes that could not be run.
         gain: over Monte Carlo, an episode, with a 95 % interval.
         per_hour: arrivals in an hour of exposure.
+        parts: the probabilities of the kinds of violation, each with an interval of its own.
     """
 
     method: str
@@ -54,6 +72,7 @@ class EstimateFacts:
     errors: int
     gain: tuple[float, float, float]
     per_hour: float
+    parts: tuple[EventEstimate, ...] = ()
 
     @property
     def found(self) -> Estimate | None:
@@ -94,6 +113,8 @@ class Estimating:
         self._told: dict[int, PlayedVector] = {}
         self._lasted: dict[int, float] = {}
         self._errors: set[int] = set()
+        self._violations: dict[int, list[tuple[str, str]]] = {}
+        self._assertions = plan.scenario.assertions
 
     def ready(self, run: int) -> bool:
         """Whether the vector of an episode is known."""
@@ -113,6 +134,7 @@ class Estimating:
             return
         number = self._number(int(row["run"]))
         self._told[number] = played_vector(row)
+        self._violations[number] = violations(row)
         self._lasted[number] = float(cell(row["time_s"]) or 0.0)
         if row["outcome"] == "error":
             self._errors.add(number)
@@ -139,7 +161,21 @@ class Estimating:
             errors=len(self._errors),
             gain=self._estimator.gain(),
             per_hour=self.encounters.per_hour,
+            parts=tuple(self._parts()),
         )
+
+    def _parts(self) -> Iterator[EventEstimate]:
+        """Every assertion, and the kinds of its violations that happened, once it is over."""
+        if not self._estimator.over:
+            return
+        each = [self._violations[n] for n in sorted(self._violations)]
+        there = {event for events in each for event in events}
+        for name in self._assertions:
+            for kind in (VIOLATED, *ORDER, UNFAIR):
+                if kind == VIOLATED or (name, kind) in there:
+                    happened = np.array([(name, kind) in events for events in each])
+                    found = self._estimator.of(happened)
+                    yield EventEstimate(name, kind, int(happened.sum()), found)
 
     def _number(self, run: int) -> int:
         """The number of an episode among those of the agent."""

@@ -4,7 +4,8 @@
 left to the planner, whose problem is to come from the ego's first state to the end of its route.
 Obstacles follow the clock in both: the format has no triggers. The position of a body is the middle
 of its box; coordinates are those of the network, in m, headings in rad, x to the east and y to the
-north. A time step is that of the episode.
+north. A time step is that of the episode. The format wants a first state of everybody in time step 0,
+and its readers count all others from there on: who enters later waits far away until then (``AWAY_M``).
 
 The file is written without the package commonroad-io, whose classes differ from version to version
 (2024 and 2026), while the format is the same; it is read by both.
@@ -36,6 +37,7 @@ VERSION = "2020a"
 UNDATED = "2000-01-01"  # so that the same test gives the same bytes
 FIRST_BODY, PROBLEM = 100_001, 90_001  # ids, beyond those of lanelets
 DECIMALS = 12
+AWAY_M = 100_000.0  # to the south
 GOAL_M = 10.0, 5.0  # length and width of the goal, at the end of the ego's route
 TYPES = {PEDESTRIAN.name: "pedestrian", BICYCLE.name: "bicycle", BUS.name: "bus"}
 TYPES |= {"truck": "truck", "trailer": "truck", "motorcycle": "motorcycle", "moped": "motorcycle"}
@@ -58,15 +60,18 @@ def write_commonroad(trace: Trace, place: ExportPlace, folder: Path, way: str) -
         ET.SubElement(tags, tag)
     for strip in strips(place.net, _lines(place, bodies)):
         _add_lanelet(root, strip)
-    ids = dict[int, str]()
+    ids, enters = dict[int, str](), dict[int, int]()
     for body in bodies:
         for track in () if way == TEST and body.part == "ego" else body.tracks:
             number = FIRST_BODY + len(ids)
             ids[number] = body.name
-            _add_obstacle(root, number, body.shape, track, dt)
+            whole = _from_the_beginning(track, dt)
+            if len(whole) > len(track):
+                enters[number] = len(whole) - len(track)
+            _add_obstacle(root, number, body.shape, whole, dt)
     _add_problem(root, bodies[0], place, dt)
     kinds = {body.name: [body.part, *body.shape] for body in bodies}
-    head = {**head_of(trace, way), "ids": ids, "bodies": kinds}
+    head = {**head_of(trace, way), "ids": ids, "enters": enters, "bodies": kinds}
     write_all(folder, {XML: _text(root, head, notice)})
 
 
@@ -143,6 +148,16 @@ def _add_lanelet(root: ET.Element, strip: Strip) -> None:
 def _user(on_foot: bool) -> str:
     """The users of a lanelet."""
     return "pedestrian" if on_foot else "vehicle"
+
+
+def _from_the_beginning(track: Track, dt: float) -> Track:
+    """A track with a state in each time step before its first one, standing far away."""
+    first = track[0]
+    away = [
+        first._replace(time=step * dt, y=first.y - AWAY_M, speed=0.0)
+        for step in range(round(first.time / dt))
+    ]
+    return [*away, *track]
 
 
 def _add_obstacle(root: ET.Element, number: int, shape: Shape, track: Track, dt: float) -> None:

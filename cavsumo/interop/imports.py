@@ -150,8 +150,10 @@ def _commonroad(root: ET.Element, text: str) -> tuple[dict[str, Any], dict[str, 
     bodies = {name: _Body(part, Shape(*box), []) for name, (part, *box) in head["bodies"].items()}
     dt = _number(root, "timeStepSize")
     for obstacle in root.findall("dynamicObstacle"):
-        body = bodies[head["ids"][str(obstacle.get("id"))]]
-        for state in (*obstacle.findall("initialState"), *obstacle.findall("trajectory/state")):
+        number = str(obstacle.get("id"))
+        body, away = bodies[head["ids"][number]], int(head.get("enters", {}).get(number, 0))
+        states = [*obstacle.findall("initialState"), *obstacle.findall("trajectory/state")]
+        for state in states[away:]:
             x, y, heading, step, speed = (
                 _finite(state.findtext(path), f"<{path}>")
                 for path in ("position/point/x", "position/point/y", "orientation/exact",

@@ -29,6 +29,7 @@ from typing import Any
 from cavsumo.batch.located import located
 from cavsumo.batch.replay import Record, recorded_alone
 from cavsumo.errors import InputError, ResultsError, shown
+from cavsumo.kept.names import CAVTEST
 from cavsumo.kept.strangers import check_inputs
 from cavsumo.model.checksums import checksum
 from cavsumo.model.documents import json_of
@@ -39,7 +40,6 @@ from cavsumo.results.trace_file import packed
 from cavsumo.results.traces import Trace, trace_text
 
 FORMAT = "cavsumo-test-1"
-ENDING = ".cavtest"
 ABOUT, TRACE, PAGE = "test.json", "trace.jsonl.gz", "page.html"
 MOST_B: Mapping[str, int] = {ABOUT: 1 << 20, TRACE: 1 << 27, PAGE: 1 << 27}
 MOST_ALL_B = LARGEST  # bytes of all members together
@@ -69,7 +69,7 @@ class KeptTest:
 
 def is_cavtest(file: Path) -> bool:
     """Whether this is the name of a kept test."""
-    return file.name.endswith(ENDING)
+    return file.name.endswith(CAVTEST)
 
 
 def write_cavtest(file: Path, record: Record, page: str, about: Mapping[str, Any]) -> None:

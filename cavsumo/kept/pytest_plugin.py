@@ -12,10 +12,11 @@ from typing import TYPE_CHECKING, Any
 
 import pytest
 
+from cavsumo.kept.names import CAVTEST
+
 if TYPE_CHECKING:
     from cavsumo.kept.regression import OtherEgo
 
-ENDING = ".cavtest"
 OPTIONS = {
     "ego": "the ego that plays kept tests (.cavtest), as for cavsumo run --ego",
     "testers": "what their testers follow: recorded (default) or policy",
@@ -35,7 +36,7 @@ def pytest_addoption(parser: pytest.Parser) -> None:
 
 def pytest_collect_file(file_path: Path, parent: pytest.Collector) -> pytest.Collector | None:
     """A collector for a kept test."""
-    if file_path.suffix != ENDING:
+    if file_path.suffix != CAVTEST:
         return None
     collector: pytest.Collector = KeptTestFile.from_parent(parent, path=file_path)
     return collector

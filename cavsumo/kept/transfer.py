@@ -22,10 +22,10 @@ from cavsumo.batch.prepared import prepare
 from cavsumo.batch.replay import Record, recorded
 from cavsumo.batch.trust import check_trust
 from cavsumo.errors import InputError, NetworkError
-from cavsumo.kept.cavtest import is_cavtest, read_cavtest
-from cavsumo.kept.transfer_form import FORMS, RelativeTest, relative_test
-from cavsumo.model.named_networks import check_network
-from cavsumo.model.scenario import Params, plan_from
+from cavsumo.kept.cavtest import read_cavtest
+from cavsumo.kept.transfer_form import RelativeTest, relative_test
+from cavsumo.kept.transfer_order import TransferOrder, check_order, named_test
+from cavsumo.model.scenario import plan_from
 from cavsumo.model.study import Part
 from cavsumo.network.recorded_starts import start_record
 from cavsumo.searchers.places import Place
@@ -40,32 +40,6 @@ KEPT = (
     "ego", "ego_params", "ego_sensor", "tester_sensor", "end", "step_length", "assertions",
     "assertion_params", "formulas", "kind", "start_speed", "jaywalk", "embodiment", "sumo_width",
 )  # fmt: skip
-
-
-@dataclass(frozen=True)
-class TransferOrder:
-    """An order of a transfer: which tests, and where.
-
-    Attributes:
-        tests: kept tests, or rows of results as ``FILE.csv:RUN``.
-        nets: names or files of networks.
-        ego, ego_params: in place of the egos of the tests; None for their own.
-        places: of a test on a network, at most.
-        seeds: episodes at each place, in each form.
-        seed: of the batches.
-        forms: of each test: in its zone, in its phase.
-        trust: use egos and assertions that only the files name.
-    """
-
-    tests: Sequence[str]
-    nets: Sequence[str]
-    ego: str | None = None
-    ego_params: Params | None = None
-    places: int = 5
-    seeds: int = 3
-    seed: int = 1
-    forms: Sequence[str] = FORMS
-    trust: bool = False
 
 
 @dataclass(frozen=True)
@@ -87,8 +61,7 @@ class TransferParts:
 
 def transfer_parts(order: TransferOrder) -> TransferParts:
     """The batches of a transfer; raises InputError before anything is played."""
-    for net in order.nets:
-        check_network(Path(net), "--net")
+    check_order(order)
     names = [Path(net).name.split(".")[0] for net in order.nets]
     if len({*names}) < len(names):
         raise InputError(f"transfer: two networks are called {max(names, key=names.count)!r}")
@@ -115,12 +88,10 @@ class _Group:
 def _record(name: str, order: TransferOrder) -> Record:
     """The episode that a name means."""
     allowed = None if order.trust else (order.ego,) if order.ego else ()
-    if is_cavtest(Path(name)):
-        return read_cavtest(Path(name), allowed).record
-    file, colon, run = name.rpartition(":")
-    if not colon or not run.isdecimal():
-        raise InputError(f"{name!r}: expected a kept test (.cavtest), or a row as FILE.csv:RUN")
-    record = located(recorded(Path(file), int(run), allowed))
+    file, run = named_test(name)
+    if run is None:
+        return read_cavtest(file, allowed).record
+    record = located(recorded(file, run, allowed))
     check_trust(record.plan.scenario, record.file, allowed)
     return record
 
@@ -144,7 +115,7 @@ def _settings(test: RelativeTest, order: TransferOrder) -> dict[str, Any]:
     whole = plan.scenario.model_dump(mode="json", exclude_none=True)
     found = {key: whole[key] for key in KEPT if key in whole}
     if order.ego is not None:
-        found |= {"ego": order.ego, "ego_params": dict(order.ego_params or {})}
+        found |= {"ego": order.ego, "ego_params": dict(order.ego_params)}
     shared = {"routes": "none", "testers": 1, "bodies_per_agent": 1, "agents": [SEARCH]}
     rest = {"reference": plan.reference, "runs": order.seeds, "seed": order.seed}
     return {**found, **shared, **rest}

@@ -32,6 +32,7 @@ from cavsumo.batch.prepared import prepare
 from cavsumo.batch.replay import Record
 from cavsumo.egos.specs import ego_of
 from cavsumo.errors import InputError
+from cavsumo.kept.transfer_order import PHASE, ZONE
 from cavsumo.model.bodies import WALKING, Kind, kind_named
 from cavsumo.model.kinematics import wrap
 from cavsumo.model.polyline import Path
@@ -42,8 +43,6 @@ from cavsumo.searchers.space import Space
 STOOD_MPS = 0.05  # slower than this a body stands
 PAUSE_S = 0.3  # a shorter stop is none
 SLOWEST_EGO_MPS = 0.5  # of an ego that is slower nothing can be foreseen
-ZONE, PHASE = "zone", "phase"  # forms of a test
-FORMS = (ZONE, PHASE)
 SAME_START_M = 0.01  # between a recorded start and a place of the space
 
 
@@ -111,7 +110,8 @@ def relative_test(name: str, record: Record) -> RelativeTest:
             return _known(name, record, kind, programme, place, every)
     if kind.name not in WALKING:
         raise InputError(
-            f"{name}: only tests of vehicles that agent {SEARCH} plays have a relative form"
+            f"{name}: the vehicle that the ego hits was not moved by agent {SEARCH}, and its track "
+            "follows the lanes of its own network: only programmes of a search have a relative form"
         )
     track = WalkedTrack.of(record, row["tester"], home.site.route.path, kind)
     walk = track.programme(name)

@@ -41,7 +41,7 @@ class Beginning:
 
 @dataclass
 class _Init:
-    """What the actions of an entity at the beginning say."""
+    """The actions of an entity at the beginning, as they are read."""
 
     spot: GivenPlace | None = None
     route: XmlNode | None = None

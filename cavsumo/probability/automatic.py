@@ -16,7 +16,7 @@ import numpy as np
 from cavsumo.probability.importance import PILOTS, Pilots, WeightedEstimation
 from cavsumo.probability.monte_carlo import MonteCarlo
 from cavsumo.probability.protocol import FEWEST_EPISODES, Goal, PlayedVector
-from cavsumo.probability.tree import Floats
+from cavsumo.probability.tree import Bools, Floats
 from cavsumo.probability.weights import Estimate
 
 PILOT_SHARE = 0.08
@@ -57,6 +57,13 @@ class Automatic:
             self._generations += 1
             self._pilots.tell(played)
             self._choose()
+
+    def of(self, happened: Bools) -> Estimate:
+        if self._plain is not None:
+            found = self._plain.of(happened[self._spent :])
+            return replace(found, episodes=found.episodes + self._spent)
+        assert self._weighted is not None
+        return self._weighted.of(happened)
 
     def gain(self) -> tuple[float, float, float]:
         if self._plain is not None:

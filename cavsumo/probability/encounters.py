@@ -17,10 +17,10 @@ from cavsumo.agents.recorded import Teams
 from cavsumo.errors import InputError, NetworkError
 from cavsumo.model.bodies import CAR, WALKING, Kind
 from cavsumo.network.pedestrian_starts import APART_M
-from cavsumo.network.recorded_starts import start_record
 from cavsumo.network.site import Site
+from cavsumo.probability.encounter_space import EncounterSpace
 from cavsumo.probability.exposure import Exposure, exposure_of
-from cavsumo.probability.stratified import Cut, cuts_of
+from cavsumo.probability.stratified import Cut
 from cavsumo.probability.tree import Floats
 from cavsumo.probability.vehicle_encounters import KINDS, VehicleEncounters, vehicle_encounters
 from cavsumo.searchers.places import Place
@@ -34,33 +34,16 @@ DEPTHS_M = (-1.0, 1.0)  # where somebody stops, from the edge of the ego's strip
 
 
 @dataclass(frozen=True)
-class Encounters:
-    """The encounters of an exposure at a site.
+class Encounters(EncounterSpace):
+    """Encounters with pedestrians.
 
     Attributes:
-        site, places: where pedestrians arrive: all places alike.
-        kind: of the bodies.
-        teams: for each agent the indices of its bodies.
+        places: where they arrive: all places alike.
         exposure: what they do by chance.
-        names: the coordinates of each body.
     """
 
-    site: Site
     places: tuple[Place, ...]
-    kind: Kind
-    teams: Teams
     exposure: Exposure
-    names: tuple[str, ...]
-
-    @property
-    def bodies(self) -> int:
-        """The number of bodies."""
-        return sum(map(len, self.teams))
-
-    @property
-    def dimension(self) -> int:
-        """How many numbers a vector has."""
-        return self.bodies * len(self.names)
 
     @property
     def per_hour(self) -> float:
@@ -71,29 +54,21 @@ class Encounters:
     def cuts(self) -> tuple[Cut, ...]:
         """The shares at which behaviour changes, in the order of the coordinates."""
         chance = self.exposure
-        shares = {
-            "attention": chance.attention.inattentive,
-            ON_RED: chance.compliance.against_red,
-            STOPS[0]: chance.hesitation.share,
-        }
-        return cuts_of(self.names * self.bodies, shares)
+        return self.cuts_at(
+            {
+                "attention": chance.attention.inattentive,
+                ON_RED: chance.compliance.against_red,
+                STOPS[0]: chance.hesitation.share,
+            }
+        )
 
     def memories(self, vector: Floats) -> tuple[dict[str, Any], ...]:
         """The memories with which the agents of ``agents.exposed`` play a vector."""
-        size, taken = len(self.names), list[Place]()
-        bodies = []
-        for i in range(self.bodies):
-            part = vector[i * size : (i + 1) * size]
-            drawn = dict(zip(self.names, map(float, part), strict=True))
+        taken, walkers = list[Place](), list[dict[str, Any]]()
+        for drawn in self.drawn(vector):
             taken.append(self._place(drawn["place"], taken))
-            bodies.append(self._walker(drawn))
-        return tuple(
-            {
-                "starts": [list(start_record(self.site, taken[i].start)) for i in team],
-                "walkers": [bodies[i] for i in team],
-            }
-            for team in self.teams
-        )
+            walkers.append(self._walker(drawn))
+        return self.told([place.start for place in taken], "walkers", walkers)
 
     def _walker(self, drawn: dict[str, float]) -> dict[str, Any]:
         """The behaviour of one body."""
@@ -169,4 +144,4 @@ def encounters_of(
     names = [*NAMES, *([ON_RED] if any(one.signalled for one in site.marked) else [])]
     names += STOPS if exposure.hesitation.share > 0.0 else ()
     places = walks_at(site, kind).places
-    return Encounters(site, places, kind, teams, exposure, tuple(names))
+    return Encounters(site, kind, teams, tuple(names), places, exposure)

@@ -15,7 +15,7 @@ import numpy as np
 
 from cavsumo.probability.kernels import Kernels, learned, uniform
 from cavsumo.probability.protocol import ALL_PLAYED, Goal, PlayedVector, looks
-from cavsumo.probability.tree import Floats
+from cavsumo.probability.tree import Bools, Floats
 from cavsumo.probability.weights import Estimate, contradicts, gain_of, weighted
 
 PILOTS, PILOT_SHARE = 4, 0.1  # of all episodes, each
@@ -98,6 +98,10 @@ class ImportanceSampling:
         self.history.append(self._final.tell(played))
         self.over = self._final.over
 
+    def of(self, happened: Bools) -> Estimate:
+        assert self._final is not None
+        return self._final.of(happened)
+
     def gain(self) -> tuple[float, float, float]:
         return (float("nan"), 0.0, float("inf")) if self._final is None else self._final.gain()
 
@@ -109,7 +113,7 @@ class WeightedEstimation:
         self.over = ""
         self._pilots, self._goal, self._rng = pilots, goal, rng
         self._looks = looks(goal.episodes - pilots.played, 1.0 - goal.level)
-        self._terms = np.zeros(0)
+        self._weights, self._terms, self._error = np.zeros(0), np.zeros(0), 0.0
         self._asked = np.zeros((0, pilots.proposal.dimension))
 
     def ask(self) -> Floats:
@@ -121,12 +125,11 @@ class WeightedEstimation:
     def tell(self, played: Sequence[PlayedVector]) -> Estimate:
         """The estimate at this look."""
         failed = np.array([one.failed for one in played])
-        terms = failed / self._pilots.proposal.density(self._asked)
-        self._terms = np.append(self._terms, terms)
-        found = weighted(self._terms, 1.0 - self._looks.pop(0).error)
-        found = replace(
-            found, level=self._goal.level, episodes=self._pilots.played + len(self._terms)
-        )
+        weights = 1.0 / self._pilots.proposal.density(self._asked)
+        self._weights = np.append(self._weights, weights)
+        self._terms = np.append(self._terms, failed * weights)
+        self._error = self._looks.pop(0).error
+        found = self._weighed(self._terms)
         pilot = self._pilots.last
         if not found.refused and pilot and not pilot.refused and contradicts(found, pilot):
             found = replace(found, refused="the estimate contradicts its last pilot")
@@ -134,6 +137,17 @@ class WeightedEstimation:
         if not self.over and not self._looks:
             self.over = ALL_PLAYED
         return found
+
+    def of(self, happened: Bools) -> Estimate:
+        """See ``Estimator``; the first of the vectors are those of the pilots."""
+        own = happened[self._pilots.played :][: len(self._weights)]
+        return self._weighed(own * self._weights)
+
+    def _weighed(self, terms: Floats) -> Estimate:
+        """The estimate from terms, at the last look."""
+        found = weighted(terms, 1.0 - self._error)
+        episodes = self._pilots.played + len(terms)
+        return replace(found, level=self._goal.level, episodes=episodes)
 
     def gain(self) -> tuple[float, float, float]:
         """See ``Estimator``."""

@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from cavsumo.probability.protocol import ALL_PLAYED, Goal, PlayedVector, looks
-from cavsumo.probability.tree import Floats
+from cavsumo.probability.tree import Bools, Floats
 from cavsumo.probability.weights import Estimate
 
 
@@ -27,6 +27,7 @@ class MonteCarlo:
 
     def __post_init__(self) -> None:
         self._looks = looks(self.goal.episodes, 1.0 - self.goal.level)
+        self._error = 0.0  # spent at the last look
 
     def ask(self) -> Floats:
         return self.rng.random((self._looks[0].episodes - self.played, self.dimension))
@@ -35,10 +36,15 @@ class MonteCarlo:
         self.played += len(played)
         self.failures += sum(one.failed for one in played)
         look = self._looks.pop(0)
+        self._error = look.error
         self.history.append(exact_estimate(self.failures, self.played, look.error, self.goal.level))
         self.over = self.goal.reached(self.history[-1])
         if not self.over and not self._looks:
             self.over = ALL_PLAYED
+
+    def of(self, happened: Bools) -> Estimate:
+        count = int(happened[: self.played].sum())
+        return exact_estimate(count, self.played, self._error, self.goal.level)
 
     def gain(self) -> tuple[float, float, float]:
         return 1.0, 1.0, 1.0

@@ -13,7 +13,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import NamedTuple, Protocol
 
-from cavsumo.probability.tree import Floats
+from cavsumo.probability.tree import Bools, Floats
 from cavsumo.probability.weights import Estimate
 
 ALL_PLAYED = "all episodes are played"
@@ -77,6 +77,12 @@ class Estimator(Protocol):
 
     def tell(self, played: Sequence[PlayedVector]) -> None:
         """Take up the results of the vectors that were asked for last, in their order."""
+
+    def of(self, happened: Bools) -> Estimate:
+        """The estimate at the last look of another event, by the same vectors.
+
+        ``happened``: with each of the vectors told so far, in their order; more are left out.
+        """
 
     def gain(self) -> tuple[float, float, float]:
         """The gain over Monte Carlo an episode, pilots included, with a 95 % interval."""

@@ -20,7 +20,15 @@ from typing import NamedTuple
 import numpy as np
 
 from cavsumo.probability.noisy import FAILED, RUNNING, NoisyProcess, SteppedEstimate
-from cavsumo.probability.shifts import IN_SQUARES, IN_TIME, FailingRuns, Shift, fitted, joined, latest
+from cavsumo.probability.shifts import (
+    IN_SQUARES,
+    IN_TIME,
+    FailingRuns,
+    Shift,
+    fitted,
+    joined,
+    latest,
+)
 from cavsumo.probability.tree import Floats, Ints
 from cavsumo.probability.weights import LEVEL, contradicts, weighted
 

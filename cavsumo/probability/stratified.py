@@ -22,7 +22,7 @@ from typing import NamedTuple
 import numpy as np
 
 from cavsumo.probability.protocol import ALL_PLAYED, Goal, PlayedVector, looks
-from cavsumo.probability.tree import Floats, Ints
+from cavsumo.probability.tree import Bools, Floats, Ints
 from cavsumo.probability.weights import Estimate, quantiles
 
 MOST_CUTS = 4  # 16 strata
@@ -58,6 +58,8 @@ class Stratified:
         self.played: Ints = np.zeros(len(self.weights), dtype=int)
         self.failures: Ints = np.zeros(len(self.weights), dtype=int)
         self._asked: Ints = np.zeros(0, dtype=int)
+        self._told: Ints = np.zeros(0, dtype=int)  # the stratum of each vector told so far
+        self._error = 0.0  # spent at the last look
 
     def ask(self) -> Floats:
         wanted = allocated(self.weights, self._looks[0].episodes)
@@ -70,14 +72,21 @@ class Stratified:
         failed = np.array([one.failed for one in played])
         self.played += np.bincount(self._asked, minlength=len(self.played))
         self.failures += np.bincount(self._asked[failed], minlength=len(self.played))
-        look = self._looks.pop(0)
-        factors = self.weights / self.played
-        self.history.append(
-            weighted_counts(self.failures, factors, look.error, self.goal.level, look.episodes)
-        )
+        self._told = np.append(self._told, self._asked)
+        self._error = self._looks.pop(0).error
+        self.history.append(self._counted(self.failures))
         self.over = self.goal.reached(self.history[-1])
         if not self.over and not self._looks:
             self.over = ALL_PLAYED
+
+    def of(self, happened: Bools) -> Estimate:
+        strata = self._told[happened[: len(self._told)]]
+        return self._counted(np.bincount(strata, minlength=len(self.weights)))
+
+    def _counted(self, counts: Ints) -> Estimate:
+        """The estimate from counts in the strata, at the last look."""
+        factors, played = self.weights / self.played, int(self.played.sum())
+        return weighted_counts(counts, factors, self._error, self.goal.level, played)
 
     def gain(self) -> tuple[float, float, float]:
         if not self.failures.any():

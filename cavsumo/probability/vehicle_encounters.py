@@ -17,11 +17,11 @@ from cavsumo.errors import InputError, NetworkError
 from cavsumo.model.bodies import BICYCLE, CAR, Kind
 from cavsumo.model.carriageway import Approach, Start
 from cavsumo.model.geometry import Box, gap
-from cavsumo.network.recorded_starts import start_record
 from cavsumo.network.site import Site
 from cavsumo.network.vehicle_starts import APART_M
+from cavsumo.probability.encounter_space import EncounterSpace
 from cavsumo.probability.exposure import VehicleExposure
-from cavsumo.probability.stratified import Cut, cuts_of
+from cavsumo.probability.stratified import Cut
 from cavsumo.probability.tree import Floats
 from cavsumo.searchers.places import NEAREST_M
 
@@ -35,31 +35,18 @@ KINDS = (BICYCLE.name, CAR.name)
 
 
 @dataclass(frozen=True)
-class VehicleEncounters:
-    """The encounters of an exposure with vehicles at a site (see ``encounters.Encounters``).
+class VehicleEncounters(EncounterSpace):
+    """Encounters with vehicles.
 
     Attributes:
         approaches: the ways that cross the ego's or lead into it: all alike.
         ego: the kind of the ego.
+        exposure: what they do by chance.
     """
 
-    site: Site
     approaches: tuple[Approach, ...]
-    kind: Kind
     ego: Kind
-    teams: Teams
     exposure: VehicleExposure
-    names: tuple[str, ...]
-
-    @property
-    def bodies(self) -> int:
-        """The number of bodies."""
-        return sum(map(len, self.teams))
-
-    @property
-    def dimension(self) -> int:
-        """How many numbers a vector has."""
-        return self.bodies * len(self.names)
 
     @property
     def per_hour(self) -> float:
@@ -69,30 +56,24 @@ class VehicleEncounters:
     @property
     def cuts(self) -> tuple[Cut, ...]:
         """The shares at which behaviour changes."""
-        shares = {
-            "attention": self.exposure.attention.inattentive,
-            ON_RED: self.exposure.compliance.against_red,
-        }
-        return cuts_of(self.names * self.bodies, shares)
+        chance = self.exposure
+        return self.cuts_at(
+            {
+                "attention": chance.attention.inattentive,
+                ON_RED: chance.compliance.against_red,
+            }
+        )
 
     def memories(self, vector: Floats) -> tuple[dict[str, Any], ...]:
         """The memories with which the agents of ``agents.exposed`` play a vector."""
-        size, starts = len(self.names), list[Start]()
-        drivers = []
-        for part in vector.reshape(-1, size):
-            drawn = dict(zip(self.names, map(float, part), strict=True))
+        starts, drivers = list[Start](), list[dict[str, Any]]()
+        for drawn in self.drawn(vector):
             speed = min(
                 self.kind.v_max, self.exposure.speed_mps.quantile(drawn["speed"], SLOWEST_MPS)
             )
             starts.append(self._start(drawn, speed, starts))
             drivers.append(self._driver(drawn, speed))
-        return tuple(
-            {
-                "starts": [list(start_record(self.site, starts[i])) for i in team],
-                "drivers": [drivers[i] for i in team],
-            }
-            for team in self.teams
-        )
+        return self.told(starts, "drivers", drivers)
 
     def _driver(self, drawn: dict[str, float], speed: float) -> dict[str, Any]:
         """The behaviour of one body."""
@@ -150,4 +131,4 @@ def vehicle_encounters(
             "more from its beginning; choose another --ego-route"
         )
     names = (*NAMES, ON_RED) if site.lights else NAMES
-    return VehicleEncounters(site, ways, kind, ego, teams, exposure, names)
+    return VehicleEncounters(site, kind, teams, names, ways, ego, exposure)

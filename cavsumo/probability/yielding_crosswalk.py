@@ -27,12 +27,9 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from cavsumo.probability.noisy import ENDED, FAILED, RUNNING
-from cavsumo.probability.tree import Floats
-
-Bools = NDArray[np.bool_]
+from cavsumo.probability.tree import Bools, Floats
 
 DT_S, DEVIATION = 0.2, 0.25
 CROSSWALK_X_M, ENTRY_X_M, EXIT_X_M = 25.0, 22.0, 28.0

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from cavsumo.batch.estimating import EstimateFacts
+from cavsumo.batch.estimating import EstimateFacts, EventEstimate
 from cavsumo.errors import InputError
 from cavsumo.probability.monte_carlo import needed_without_failure
 from cavsumo.probability.ratio import Ratio
@@ -39,6 +39,7 @@ def as_json(facts: EstimateFacts, bound: float | None = None) -> dict[str, Any]:
         "episodes_without_failure_for_bound": needed_without_failure(bound, 0.95)
         if bound
         else None,
+        "by_assertion": [_part(facts, one) for one in facts.parts],
         "looks": [_look(one) for one in facts.history],
     }
 
@@ -63,7 +64,23 @@ def words(facts: EstimateFacts, bound: float | None = None) -> str:
             f"no preventable failure: at most {found.upper:.3g} an encounter ({found.level:.0%}); "
             f"{need} episodes without any would show at most {asked:.2g}"
         )
-    return "\n".join(lines)
+    return "\n".join([*lines, *_table(facts)])
+
+
+def _table(facts: EstimateFacts) -> list[str]:
+    """The probabilities of the kinds of violation, in lines."""
+    rows = [("assertion", "kind", "episodes", "an encounter", "an hour")]
+    for one in facts.parts:
+        numbers = _part_numbers(facts, one)
+        if numbers is None:
+            said = one.found.refused, ""
+        else:
+            said = _bracketed(*numbers), _bracketed(*(facts.per_hour * n for n in numbers))
+        rows.append((one.assertion, one.kind, str(one.episodes), *said))
+    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
+    aligned = (zip(row, widths, strict=True) for row in rows)
+    level = f"each interval {facts.parts[0].found.level:.0%}, not all jointly:"
+    return [level, *("  ".join(cell.ljust(n) for cell, n in row).rstrip() for row in aligned)]
 
 
 def ratio_words(first: str, second: str, ratio: Ratio) -> str:
@@ -147,8 +164,34 @@ def _look(found: Estimate) -> dict[str, Any]:
     return {key: getattr(found, key) for key in keys} | {"refused": found.refused or None}
 
 
+def _part(facts: EstimateFacts, one: EventEstimate) -> dict[str, Any]:
+    """The probability of a kind of violation as plain data; None where it is refused."""
+    p, low, high = _part_numbers(facts, one) or (None, None, None)
+    return {
+        "assertion": one.assertion,
+        "kind": one.kind,
+        "episodes": one.episodes,
+        "p": p,
+        "lower": low,
+        "upper": high,
+        "per_hour": _times(facts.per_hour, p, low, high),
+        "refused": facts.refused or one.found.refused or None,
+    }
+
+
+def _part_numbers(facts: EstimateFacts, one: EventEstimate) -> tuple[float, float, float] | None:
+    """Estimate and interval of a kind of violation; None where it or the whole is refused."""
+    found = one.found
+    refused = facts.refused or found.refused
+    return None if refused else (found.p, found.lower, found.upper)
+
+
 def _interval(found: Estimate) -> str:
-    return f"{found.p:.3g} [{found.lower:.3g}, {found.upper:.3g}]"
+    return _bracketed(found.p, found.lower, found.upper)
+
+
+def _bracketed(p: float, low: float, high: float) -> str:
+    return f"{p:.3g} [{low:.3g}, {high:.3g}]"
 
 
 def _gain(gain: tuple[float, float, float]) -> str:

@@ -25,19 +25,23 @@ WORD = 28  # least width of a column of words
 
 def as_table(report: Report) -> str:
     """Tables for people, 100 columns wide where the figures allow it."""
+    return "\n".join(map(drawn, tables(report)))
+
+
+def drawn(table: Table) -> str:
+    """A table drawn by rich, indented under its title if it has one."""
     text = io.StringIO()  # rich would show it in a notebook instead
     console = Console(file=text, width=WIDTH, color_system=None, force_jupyter=False)
-    for i, table in enumerate(tables(report)):
-        if i:
-            console.print()
+    indent = INDENT if table.title else 0
+    if table.title:
         console.print(Text(table.title))
-        grid = _grid(table)
-        least = Measurement.get(console, console.options.update(width=WIDEST), grid).minimum
-        console.width = max(WIDTH, least + INDENT)
-        console.print(Padding(grid, (0, 0, 0, INDENT)), highlight=False)
-        console.width = WIDTH
-        for note in table.notes:
-            console.print(Padding(Text(note), (0, 0, 0, INDENT)), highlight=False)
+    grid = _grid(table)
+    least = Measurement.get(console, console.options.update(width=WIDEST), grid).minimum
+    console.width = max(WIDTH, least + indent)
+    console.print(Padding(grid, (0, 0, 0, indent)), highlight=False)
+    console.width = WIDTH
+    for note in table.notes:
+        console.print(Padding(Text(note), (0, 0, 0, indent)), highlight=False)
     return "".join(f"{line.rstrip()}\n" for line in text.getvalue().splitlines())
 
 

@@ -10,8 +10,9 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from typing import Any, TypeVar
 
+from cavsumo.assertions.judgement import HELD, NOT_TRIGGERED, UNFAIR, VIOLATED
 from cavsumo.results.grade import INVALID_GRADE
-from cavsumo.results.rows import cell, is_failure
+from cavsumo.results.rows import cell, is_failure, verdicts_of
 
 PREVENTABLE, NOT_JUDGED, UNPREVENTABLE = "preventable", "not judged", "unpreventable"
 ORDER = (PREVENTABLE, NOT_JUDGED, UNPREVENTABLE)
@@ -38,6 +39,24 @@ def graded(row: Mapping[str, Any]) -> tuple[float, bool]:
     said = cell(row["grade"])
     found = float(said) if said else INVALID_GRADE
     return found, failure_kind(row) in (PREVENTABLE, NOT_JUDGED) and found >= 0.0
+
+
+def violations(row: Mapping[str, Any]) -> list[tuple[str, str]]:
+    """What the ego did to each assertion in an episode: its name and VIOLATED, its name and a kind.
+
+    Kinds are those of a failure, and UNFAIR for an unfair test. Only the violation that the row
+    names is judged; others of its episode are not.
+    """
+    if row["outcome"] not in (HELD, VIOLATED, UNFAIR, NOT_TRIGGERED):
+        return []
+    found = list[tuple[str, str]]()
+    for name, verdict in verdicts_of(row).items():
+        if verdict == VIOLATED:
+            named = name == row["assertion"]
+            found += [(name, VIOLATED), (name, failure_kind(row) if named else NOT_JUDGED)]
+        elif verdict == UNFAIR:
+            found.append((name, UNFAIR))
+    return found
 
 
 def preventable_first(rows: Iterable[AnyRow]) -> list[AnyRow]:

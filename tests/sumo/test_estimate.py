@@ -15,6 +15,7 @@ from cavsumo.batch.estimated import estimated
 from cavsumo.cli import main
 from cavsumo.errors import Exit
 from cavsumo.report.estimates import as_json
+from cavsumo.report.estimates import words as sentences
 
 Capture = pytest.CaptureFixture[str]
 MOST = 100  # from which pilots learn
@@ -106,6 +107,27 @@ def test_the_result_is_that_of_the_rows(found: Path, folder: Path, capsys: Captu
     )
 
 
+def test_every_kind_of_violation_has_an_interval(folder: Path, capsys: Capture) -> None:
+    """Those of two assertions, by the same method; the headline is as without the second."""
+    words = "--exposure", str(folder / "often.toml"), "--method", "monte-carlo"
+    more = "--assert", "reaction-zone", "--assert", "collision"
+    assert _estimate(folder / "two.csv", *words, *more, "-q", "--json") == Exit.OK
+    said = json.loads(capsys.readouterr().out)
+    found = {(one["assertion"], one["kind"]): one for one in said["by_assertion"]}
+    played = rows(folder / "two.csv")
+    for name in ("reaction-zone", "collision"):
+        violated = [row for row in played if f"{name}=violated" in row["verdicts"].split()]
+        one = found[name, "violated"]
+        assert one["episodes"] == len(violated)
+        assert one["p"] == pytest.approx(len(violated) / MOST)
+        assert one["lower"] <= one["p"] <= one["upper"]
+        assert one["per_hour"]["value"] == pytest.approx(60 * one["p"])
+        kinds = [k for n, k in found if n == name and k not in ("violated", "unfair")]
+        assert sum(found[name, kind]["episodes"] for kind in kinds) == len(violated)
+    assert found["collision", "violated"]["episodes"] > 0
+    assert "each interval 95%, not all jointly" in sentences(estimated(folder / "two.csv"))
+
+
 def test_no_failure_gives_a_bound(tmp_path: Path, capsys: Capture) -> None:
     """Everybody looks and accepts long gaps alone."""
     never = tmp_path / "never.toml"
@@ -133,11 +155,11 @@ def test_two_egos_meet_the_same_encounters(folder: Path, capsys: Capture) -> Non
 def test_the_output_may_be_redirected_into_a_default_name(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """The results then lie beside it; without redirection they have the default name."""
+    """The episodes lie beside it, in names of their own."""
     monkeypatch.chdir(tmp_path)
     words = ["estimate", "--net", "pedestrians", "--ego", "constant", "--trace", "none", "-q"]
     words += ["--max-episodes", "2", "--json"]
-    for name, file in (("results.json", "estimate.csv"), ("estimate.json", "results.csv")):
+    for name, file in (("results.json", "episodes.csv"), ("episodes.json", "estimate.csv")):
         with Path(name).open("w", encoding="utf-8") as stream, monkeypatch.context() as patch:
             patch.setattr("sys.stdout", stream)
             assert main(words) == Exit.OK
@@ -146,6 +168,18 @@ def test_the_output_may_be_redirected_into_a_default_name(
         assert len(rows(tmp_path / file)) == 2
         for there in tmp_path.glob("*.*"):
             there.unlink()
+
+
+def test_the_output_may_go_by_a_pipe_into_results_json(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: Capture
+) -> None:
+    """As ``--json | tee results.json``: the file is there before the episodes are named."""
+    monkeypatch.chdir(tmp_path)
+    Path("results.json").touch()
+    words = ["estimate", "--net", "pedestrians", "--ego", "constant", "--trace", "none", "-q"]
+    assert main([*words, "--max-episodes", "2", "--json"]) == Exit.OK
+    assert json.loads(capsys.readouterr().out)["results"] == "episodes.csv"
+    assert Path("results.json").read_bytes() == b""
 
 
 def test_results_do_not_replace_the_redirected_output(

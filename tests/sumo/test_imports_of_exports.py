@@ -5,7 +5,9 @@ from __future__ import annotations
 import json
 import re
 import xml.etree.ElementTree as ET
+from collections.abc import Mapping
 from pathlib import Path
+from typing import Any
 
 import pytest
 from exporting import export_as_test, export_failure
@@ -13,7 +15,7 @@ from inline import cavsumo as command
 from support import benchmark
 
 from cavsumo.errors import Exit
-from cavsumo.results.traces import Trace, read_trace
+from cavsumo.results.traces import Trace, read_trace, states
 
 pytest.importorskip("scenariogeneration", reason="pip install 'cavsumo[export]'")
 alike = benchmark("exports").alike
@@ -114,6 +116,11 @@ def _head(text: str) -> str:
     return found[1]
 
 
+def _there(frame: Mapping[str, Any], name: str) -> bool:
+    """Whether a body is in a frame."""
+    return name in {known for _, known, _ in states(frame)}
+
+
 def test_commonroad_has_lanelets_obstacles_and_a_problem(exported: tuple[Path, Trace]) -> None:
     """References lead to lanelets; the attribution; the ego's first state; no exponents."""
     folder, trace = exported
@@ -129,6 +136,10 @@ def test_commonroad_has_lanelets_obstacles_and_a_problem(exported: tuple[Path, T
     assert {one.get("ref") for one in links} <= ids
     for lanelet in root.findall("lanelet"):
         assert len(list(lanelet[0])) == len(list(lanelet[1]))
+    begins = [body.findtext("initialState/time/exact") for body in root.iter("dynamicObstacle")]
+    assert {*begins} == {"0"}  # the schema wants that, also of the background that enters later
+    late = [name for name in trace.shapes() if not _there(trace.frames[0], name)]
+    assert late
     problem = root.find("planningProblem/initialState")
     assert problem is not None
     x, y, speed, _ = trace.frames[0]["ego"]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import math
 from collections.abc import Callable
 from pathlib import Path
@@ -61,6 +62,27 @@ def test_an_estimate_is_a_function_of_its_generator(method: str) -> None:
     assert one.history == two.history
     assert one.over == ALL_PLAYED
     assert one.history[-1].episodes == 1000
+
+
+@pytest.mark.parametrize("method", ESTIMATORS)
+@pytest.mark.parametrize("seed", [1, 2])
+def test_other_events_have_an_estimate_by_the_same_vectors(method: str, seed: int) -> None:
+    """That of the failures themselves is the headline; two parts of them sum to it."""
+    estimator = made(method, Goal(4000, NEVER), seed)
+    failed, part = list[bool](), list[bool]()
+    while not estimator.over:
+        asked = estimator.ask()
+        told = [bool(m > 0.0) for m in corner(asked) + 0.2]
+        failed += told
+        part += [bool(u > 0.5) for u in asked[:, 3]]
+        estimator.tell([PlayedVector(one, 0.0) for one in told])
+    whole, first = np.array(failed), np.array(failed) & np.array(part)
+    assert dataclasses.replace(estimator.of(whole), refused="") == dataclasses.replace(
+        estimator.history[-1], refused=""
+    )
+    parts = estimator.of(first), estimator.of(whole & ~first)
+    assert sum(one.p for one in parts) == pytest.approx(estimator.history[-1].p)
+    assert all(one.failures > 0 and one.lower < one.p < one.upper for one in parts)
 
 
 @pytest.mark.parametrize("method", ["importance", "auto"])

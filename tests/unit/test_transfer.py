@@ -12,9 +12,10 @@ from inline import cavsumo as command
 from cavsumo.errors import InputError
 from cavsumo.kept.transfer import TransferParts, label, number_of, place_of
 from cavsumo.kept.transfer_form import WalkedTrack
-from cavsumo.kept.transferred import table, transferred
+from cavsumo.kept.transferred import transferred
 from cavsumo.model.polyline import Path as Polyline
 from cavsumo.model.study import Part
+from cavsumo.report.transfers import transfer_table
 from cavsumo.results.columns import COLUMNS
 
 DT = 0.1
@@ -135,7 +136,11 @@ def test_episodes_and_places_are_counted(tmp_path: Path) -> None:
     assert (y.places, y.episodes, y.errors, y.again_at.total) == (1, 1, 1, 1)
     assert (both.places, both.episodes, both.again.count) == (3, 5, 2)
     assert found["x", "b"].again.value is None
-    assert "50.0 %" in table([x])
+    assert transfer_table([x, found["x", "b"]]).splitlines() == [
+        "test  network  places  fails at         [95 %]  episodes  fail   again         [95 %]",
+        "x     a             2         1  [ 1.3,  98.7]         4     3  50.0 %  [ 6.8,  93.2]",
+        "x     b             0         0                        0     0",
+    ]
 
 
 def test_labels_tell_tests_and_places() -> None:

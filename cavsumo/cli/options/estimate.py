@@ -19,7 +19,9 @@ if TYPE_CHECKING:
 DEFAULTS = {"agents": [EXPOSURE], "testers": 1, "runs": 2000}
 PLAIN = "monte-carlo"
 ALL = 1e-6  # a half-width that no episodes reach
-OTHERWISE = ("estimate.csv", "episodes.csv")  # where the output itself goes into SCRATCH
+# Where episodes without -o lie: the first that the output itself does not go into. A result as JSON
+# may go by a pipe into a file that is not seen from here, mostly results.json.
+PLACES = {False: (SCRATCH, "estimate.csv", "episodes.csv"), True: ("episodes.csv", "estimate.csv")}
 PICTURES = (".svg", ".png")
 
 
@@ -69,7 +71,7 @@ def _estimate(options: argparse.Namespace) -> int:
         parts = _against(parts, options)
     manner = Manner(**values_of(options, Manner), scratch=options.output is None)
     means = Means(options.jobs, options.executor, options.scheduler)
-    output = free_output(options.output, (SCRATCH, *OTHERWISE), parts)
+    output = free_output(options.output, PLACES[options.as_json], parts)
     batches = planned(parts, output, manner)
     from cavsumo.cli.commands.estimate import estimate
 

@@ -23,7 +23,7 @@ def add_transfer(commands: Any) -> None:
     add = transfer.add_argument
     add("tests", nargs="+", metavar="TEST", help="kept tests (.cavtest), or rows as FILE.csv:RUN")
     add(
-        "-n", "--net", action="append", required=True, metavar="NET",
+        "-n", "--net", dest="nets", action="append", required=True, metavar="NET",
         help="a network, by name or as a file; repeat for several",
     )  # fmt: skip
     add("--ego", metavar="NAME", help="vehicle under test (default: that of each test)")
@@ -50,15 +50,16 @@ def add_transfer(commands: Any) -> None:
 
 def _transfer(options: argparse.Namespace) -> int:
     from cavsumo.batch.manner import Manner, Means
-    from cavsumo.cli.requests.transfer import TransferOptions, check_transfer
+    from cavsumo.kept.transfer_order import FORMS, TransferOrder, check_order
     from cavsumo.model.checks import assignment
 
-    given = values_of(options, TransferOptions)
-    given["ego_param"] = dict(assignment("--ego-param", word) for word in options.ego_param)
-    wanted = TransferOptions(**given)
-    check_transfer(wanted)
+    given = values_of(options, TransferOrder)
+    given["ego_params"] = dict(assignment("--ego-param", word) for word in options.ego_param)
+    given["forms"] = FORMS if options.form == "both" else (options.form,)
+    order = TransferOrder(**given)
+    check_order(order)
     manner = Manner(**values_of(options, Manner), scratch=options.output is None)
     means = Means(options.jobs, options.executor, options.scheduler)
     from cavsumo.cli.commands.transfer import transfer
 
-    return transfer(wanted, Path(options.output or SCRATCH), means, manner)
+    return transfer(order, Path(options.output or SCRATCH), means, manner)

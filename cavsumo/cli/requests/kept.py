@@ -8,10 +8,9 @@ from pathlib import Path
 
 from cavsumo.cli.requests.files import check_folder
 from cavsumo.errors import InputError
+from cavsumo.kept.names import CAVTEST
 from cavsumo.results.reading import read_manifest
 from cavsumo.results.trace_file import is_trace
-
-ENDING = ".cavtest"
 
 
 @dataclass(frozen=True)
@@ -50,9 +49,9 @@ def check_kept(command: str, wanted: KeepOptions) -> None:
     if wanted.html is not None:
         check_folder("--html", wanted.html)
     if wanted.output is not None:
-        if wanted.output.suffix != ENDING:
+        if wanted.output.suffix != CAVTEST:
             raise InputError(
-                f"--output {str(wanted.output)!r}: expected a name that ends in {ENDING}"
+                f"--output {str(wanted.output)!r}: expected a name that ends in {CAVTEST}"
             )
         check_folder("--output", wanted.output)
     _check_episode(command, wanted.results, wanted.run)
@@ -69,7 +68,7 @@ def check_export(wanted: KeepOptions) -> None:
 
 def _check_episode(command: str, file: Path, run: int | None) -> None:
     """Refuse a file that is not there, and a number that is missing or too much."""
-    if is_trace(file) or file.suffix == ENDING:
+    if is_trace(file) or file.suffix == CAVTEST:
         if run is not None:
             raise InputError(f"{command}: {str(file)!r} is one episode; no run is named")
         if not file.is_file():

@@ -7,9 +7,9 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from cavsumo.cli.requests.files import check_folder
-from cavsumo.cli.requests.kept import ENDING
 from cavsumo.egos.names import check_ego
 from cavsumo.errors import InputError
+from cavsumo.kept.names import CAVTEST
 from cavsumo.model.scenario import Params
 
 
@@ -47,7 +47,7 @@ def check_regress(wanted: RegressOptions) -> None:
     if wanted.junit is not None:
         check_folder("--junit", wanted.junit)
     for file in wanted.tests:
-        if file.suffix != ENDING:
-            raise InputError(f"regress: {str(file)!r}: expected a name that ends in {ENDING}")
+        if file.suffix != CAVTEST:
+            raise InputError(f"regress: {str(file)!r}: expected a name that ends in {CAVTEST}")
         if not file.is_file():
             raise InputError(f"regress: no such file: {str(file)!r}")

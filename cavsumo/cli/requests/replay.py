@@ -6,8 +6,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from cavsumo.cli.requests.files import check_folder
-from cavsumo.cli.requests.kept import ENDING
 from cavsumo.errors import InputError, ResultsError
+from cavsumo.kept.names import CAVTEST
 from cavsumo.results.reading import read_manifest
 from cavsumo.results.trace_file import is_trace
 
@@ -48,7 +48,7 @@ def check_replay(file: Path, wanted: ReplayOptions) -> None:
     for option, output in (("--html", wanted.html), ("--fcd", wanted.fcd)):
         if output is not None:
             check_folder(option, output)
-    kept = file.suffix == ENDING
+    kept = file.suffix == CAVTEST
     if not is_trace(file) and not kept:
         if wanted.run is None:
             raise InputError(f"replay: which run of {str(file)!r}? name its number")
