@@ -40,7 +40,7 @@ SHARES = ((0.26, 1.0), (0.04, 0.5))  # of each shift: share and part of the mean
 BY_CHANCE = 0.1  # share
 
 
-class Component(NamedTuple):
+class ShiftedPart(NamedTuple):
     """A part of a mixture: a part of a shift (with deviation 1 unless it is whole), or chance."""
 
     share: float
@@ -87,16 +87,16 @@ def estimate_by_shifts(
     return SteppedEstimate(found, sum(one.steps for one in seen))
 
 
-def learned_mixture(seen: Sequence[ShiftedRuns]) -> tuple[Component, ...]:
+def learned_mixture(seen: Sequence[ShiftedRuns]) -> tuple[ShiftedPart, ...]:
     """The mixture that fits the failing runs of the last generations; exploration helps once."""
     kept = [one.failing for one in (seen[1:] or seen)[-POOLED:] if one.failing.count]
     if not kept:
-        return (Component(1.0),)
+        return (ShiftedPart(1.0),)
     runs = joined(kept)
     shifts = [fitted(form, runs, effective) for form, effective in EFFECTIVE.items()]
     shifts.append(fitted(IN_TIME, latest(runs), EFFECTIVE[IN_TIME]))
-    parts = [Component(share, one, part) for one in shifts for share, part in SHARES]
-    return (*parts, Component(BY_CHANCE))
+    parts = [ShiftedPart(share, one, part) for one in shifts for share, part in SHARES]
+    return (*parts, ShiftedPart(BY_CHANCE))
 
 
 def explored_runs(process: NoisyProcess, count: int, rng: np.random.Generator) -> ShiftedRuns:
@@ -112,7 +112,7 @@ def explored_runs(process: NoisyProcess, count: int, rng: np.random.Generator) -
 
 
 def shifted_runs(
-    process: NoisyProcess, mixture: Sequence[Component], count: int, rng: np.random.Generator
+    process: NoisyProcess, mixture: Sequence[ShiftedPart], count: int, rng: np.random.Generator
 ) -> ShiftedRuns:
     """Play runs whose numbers are drawn by a mixture, as many by each component as its share."""
     shares = np.array([one.share for one in mixture])

@@ -116,8 +116,8 @@ def fitted(form: str, runs: FailingRuns, effective: float) -> Shift:
     coefficients = np.linalg.solve(left, columns.T @ (weights * runs.drawn))
     rest = runs.drawn - np.clip(columns @ coefficients, -MOST, MOST)
     spread = parts.T @ (weights * rest**2) + RIDGE
-    variances: Floats = spread / ((weights * parts).sum(0)[:, None] + RIDGE)
-    variances = np.clip(variances, NARROWEST**2, WIDEST**2)
+    found = spread / ((weights * parts).sum(0)[:, None] + RIDGE)
+    variances: Floats = np.clip(found, NARROWEST**2, WIDEST**2)
     return Shift(form, coefficients, variances)
 
 
