@@ -113,7 +113,8 @@ def fitted(form: str, runs: FailingRuns, effective: float) -> Shift:
     weights *= len(weights) / weights.sum()
     columns, parts = _columns(form, runs.features, runs.times), _near(runs.times, PARTS)
     left = columns.T @ (weights * columns) + RIDGE * np.eye(columns.shape[1])
-    coefficients = np.linalg.solve(left, columns.T @ (weights * runs.drawn))
+    right = columns.T @ (weights * runs.drawn)
+    coefficients: Floats = np.linalg.solve(left, right).astype(np.float64)
     rest = runs.drawn - np.clip(columns @ coefficients, -MOST, MOST)
     spread = parts.T @ (weights * rest**2) + RIDGE
     found = spread / ((weights * parts).sum(0)[:, None] + RIDGE)
@@ -133,7 +134,7 @@ def levelled(logs: Floats, effective: float) -> Floats:
 
 
 def _columns(form: str, features: Floats, times: Floats) -> Floats:
-    """What the mean is linear in, shape (rows, columns)."""
+    """The numbers in which the mean is linear, shape (rows, columns)."""
     near = _near(times, KNOTS)
     if form == IN_TIME:
         single = np.hstack([np.ones((len(features), 1)), features])
@@ -144,6 +145,6 @@ def _columns(form: str, features: Floats, times: Floats) -> Floats:
 
 
 def _near(times: Floats, parts: int) -> Floats:
-    """How near each time is to each end of so many parts, shape (rows, parts + 1)."""
+    """The nearness of each time to each end of so many parts, shape (rows, parts + 1)."""
     found: Floats = np.maximum(0.0, 1.0 - np.abs(times[:, None] * parts - np.arange(parts + 1)))
     return found

@@ -42,7 +42,7 @@ def graded(row: Mapping[str, Any]) -> tuple[float, bool]:
 
 
 def violations(row: Mapping[str, Any]) -> list[tuple[str, str]]:
-    """What the ego did to each assertion in an episode: its name and VIOLATED, its name and a kind.
+    """The violations in an episode: each assertion's name with VIOLATED, and with a kind.
 
     Kinds are those of a failure, and UNFAIR for an unfair test. Only the violation that the row
     names is judged; others of its episode are not.
