@@ -4,8 +4,9 @@
 left to the planner, whose problem is to come from the ego's first state to the end of its route.
 Obstacles follow the clock in both: the format has no triggers. The position of a body is the middle
 of its box; coordinates are those of the network, in m, headings in rad, x to the east and y to the
-north. A time step is that of the episode. The format wants a first state of everybody in time step 0,
-and its readers count all others from there on: who enters later waits far away until then (``AWAY_M``).
+north. A time step is that of the episode. The format wants a first state of everybody in time step
+0, and its readers count all others from there on: who enters later is far away until then
+(``AWAY_M``).
 
 The file is written without the package commonroad-io, whose classes differ from version to version
 (2024 and 2026), while the format is the same; it is read by both.
