@@ -21,9 +21,10 @@ from collections.abc import Iterable, Sequence
 from pathlib import Path
 
 from cavsumo import __version__
+from cavsumo.interop.folders import check_place, write_all
 from cavsumo.interop.head import head_of
 from cavsumo.interop.lanelets import CROSSING, PAVEMENT, Strip, strips
-from cavsumo.interop.openscenario import TEST, ExportPlace, write_all
+from cavsumo.interop.openscenario import TEST, ExportPlace
 from cavsumo.interop.tracks import Stays, Track, TrackPoint, stays
 from cavsumo.model.bodies import BICYCLE, BUS, PEDESTRIAN
 from cavsumo.model.kinematics import wrap
@@ -48,10 +49,11 @@ HEAD_COMMENT = re.compile(r"<!-- cavsumo\.head (.*?) -->", re.DOTALL)
 
 
 def write_commonroad(trace: Trace, place: ExportPlace, folder: Path, way: str) -> None:
-    """Write ``test.xml`` into a folder; ``way`` is RECORDED or TEST.
+    """Write ``test.xml`` into a folder, which is made if need be; ``way`` is RECORDED or TEST.
 
     Raises InputError when the file cannot be made.
     """
+    check_place(folder)
     notice, dt = credit(place.net), step_of(trace)
     bodies = stays(trace)
     root = _root(trace, place.net, way, notice)

@@ -21,6 +21,7 @@ from typing import Any, NamedTuple
 
 from cavsumo import __version__
 from cavsumo.errors import InputError
+from cavsumo.interop.folders import check_place, write_all
 from cavsumo.interop.head import HEAD, head_of
 from cavsumo.interop.opendrive import UNDATED, XODR, roads_of
 from cavsumo.interop.storyboard_parts import (
@@ -65,7 +66,7 @@ class ExportPlace(NamedTuple):
 
 
 def write_openscenario(trace: Trace, place: ExportPlace, folder: Path, way: str = RECORDED) -> None:
-    """Write ``test.xosc`` and ``test.xodr`` into a folder.
+    """Write ``test.xosc`` and ``test.xodr`` into a folder, which is made if need be.
 
     Args:
         way: RECORDED or TEST.
@@ -73,30 +74,13 @@ def write_openscenario(trace: Trace, place: ExportPlace, folder: Path, way: str 
     Raises InputError when a package is missing, or a file cannot be made; then none is written.
     """
     xosc, notice = _library(), credit(place.net)
-    if not folder.is_dir():
-        raise InputError(f"--output {str(folder)!r}: no such folder")
+    check_place(folder)
     scenario = _scenario(xosc, trace, place, way, notice)
     roads = roads_of(place.net, notice)
     with TemporaryDirectory(prefix="cavsumo-") as work:
         scenario.write_xml(str(Path(work) / XOSC))
         story = (Path(work) / XOSC).read_text(encoding="utf-8")
     write_all(folder, {XODR: roads, XOSC: story})
-
-
-def write_all(folder: Path, texts: dict[str, str]) -> None:
-    """Write files into a folder: all of them or none."""
-    made = []
-    try:
-        for name, text in texts.items():
-            made.append((folder / f".{name}.new", folder / name))
-            made[-1][0].write_text(text, encoding="utf-8")
-        for new, file in made:
-            new.replace(file)
-    except OSError as error:
-        for new, _ in made:
-            new.unlink(missing_ok=True)
-        said = f"{str(made[-1][1])!r}: cannot be written: {error.strerror}"
-        raise InputError(said) from error
 
 
 def _library() -> Any:

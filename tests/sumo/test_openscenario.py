@@ -148,8 +148,9 @@ def test_what_cannot_be_exported_is_refused(
     """No trace, no folder: one sentence, and nothing is written."""
     words = ["export", str(found_failure), "0", "--to", "openscenario", "-o"]
     for done, said in (
-        (command(tmp_path, *words, "nowhere"), "--output 'nowhere': no such folder"),
-        (command(tmp_path, *words, ".", "--net", "gone.net.xml"), "no such file"),
+        (command(tmp_path, *words, "no/where"), "--output 'no/where': no such folder 'no'"),
+        (command(tmp_path, *words, str(found_failure)), "is a file; expected a folder"),
+        (command(tmp_path, *words, "new", "--net", "gone.net.xml"), "no such file"),
     ):
         assert (done.returncode, done.stderr.count("\n")) == (Exit.USAGE, 1), done.stderr
         assert said in done.stderr

@@ -8,6 +8,7 @@ from pathlib import Path
 
 from cavsumo.cli.requests.files import check_folder
 from cavsumo.errors import InputError
+from cavsumo.interop.folders import check_place
 from cavsumo.kept.names import CAVTEST
 from cavsumo.results.reading import read_manifest
 from cavsumo.results.trace_file import is_trace
@@ -59,8 +60,8 @@ def check_kept(command: str, wanted: KeepOptions) -> None:
 
 def check_export(wanted: KeepOptions) -> None:
     """Refuse wrong names and files."""
-    if wanted.output is None or not wanted.output.is_dir():
-        raise InputError(f"--output {str(wanted.output)!r}: no such folder")
+    assert wanted.output is not None
+    check_place(wanted.output)
     if wanted.to == "openscenario" and find_spec("scenariogeneration") is None:
         raise InputError("export: needs scenariogeneration: pip install 'cavsumo[export]'")
     _check_episode("export", wanted.results, wanted.run)
