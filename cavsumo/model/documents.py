@@ -94,7 +94,8 @@ def first_problem(error: ValidationError, apart: str = "") -> str:
     problem = error.errors(include_url=False)[0]
     place = ".".join(str(p) for p in problem["loc"] if p != apart)
     message = _MESSAGES.get(problem["type"]) or problem["msg"].removeprefix("Value error, ")
-    told = problem["type"] == "missing" or ", got " in message
+    own = problem["type"] == "value_error"  # its message says what was given
+    told = problem["type"] == "missing" or (own and ", got " in message)
     given = "" if told else f", got {shown(problem['input'])}"
     return f"{place}: {message}{given}" if place else f"{message}{given}"
 

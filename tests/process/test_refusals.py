@@ -96,7 +96,7 @@ REFUSED = {
     "minimise old.csv 0 -o a.zip": "'a.zip': expected a name that ends in .cavtest",
     "keep nowhere.cavtest -o a.cavtest": "no such file: 'nowhere.cavtest'",
     "replay nowhere.cavtest": "test 'nowhere.cavtest': cannot be read: No such file",
-    "export old.csv 0 --to openscenario -o nowhere": "--output 'nowhere': no such folder",
+    "export old.csv 0 --to openscenario -o no/where": "--output 'no/where': no such folder",
     "export old.csv 0 --to opendrive -o .": "invalid choice: 'opendrive'",
     "export old.csv 0 --to commonroad --as tests -o .": "invalid choice: 'tests'",
     "import nowhere.xosc -o a.jsonl.gz": "import: no such file: 'nowhere.xosc'",
