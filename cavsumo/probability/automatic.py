@@ -1,6 +1,7 @@
 """The automatic choice: Monte Carlo, unless pilots show that failures are rare and can be aimed at.
 
-Few episodes and frequent failures among the first need no other estimator. Otherwise pilots learn,
+With fewer than AIMED_FROM episodes pilots learn too little to aim, and would cost a third of them.
+Failures that are frequent among the first need no other estimator. Otherwise pilots learn,
 and if the last of them drew several failures, importance sampling goes on; where it is still
 refused after half of the episodes, Monte Carlo takes over. The estimate never rests on the vectors
 by which it was chosen.
@@ -15,10 +16,11 @@ import numpy as np
 
 from cavsumo.probability.importance import PILOTS, Pilots, WeightedEstimation
 from cavsumo.probability.monte_carlo import MonteCarlo
-from cavsumo.probability.protocol import FEWEST_EPISODES, Goal, PlayedVector
+from cavsumo.probability.protocol import Goal, PlayedVector
 from cavsumo.probability.tree import Bools, Floats
 from cavsumo.probability.weights import Estimate
 
+AIMED_FROM = 5000  # episodes; with fewer no proposal on known functions was worth its pilots
 PILOT_SHARE = 0.08
 FREQUENT = 3  # failures among the first pilots: Monte Carlo does as well
 FEWEST, WORTH = 2.5, 4.0  # effective failures of the last pilot, and its gain over Monte Carlo
@@ -40,7 +42,7 @@ class Automatic:
         self._generations, self._spent = 0, 0
         self._weighted: WeightedEstimation | None = None
         self._plain: MonteCarlo | None = None
-        if self.goal.episodes < FEWEST_EPISODES:
+        if self.goal.episodes < AIMED_FROM:
             self._go_plain(0)
 
     def ask(self) -> Floats:

@@ -85,10 +85,10 @@ def test_other_events_have_an_estimate_by_the_same_vectors(method: str, seed: in
     assert all(one.failures > 0 and one.lower < one.p < one.upper for one in parts)
 
 
-@pytest.mark.parametrize("method", ["importance", "auto"])
-def test_a_rare_corner_is_estimated_with_a_gain(method: str) -> None:
-    """Twenty estimates by 4,000 vectors, of which Monte Carlo expects 0.4 to fail."""
-    found = [played(made(method, Goal(4000, NEVER), seed), corner) for seed in range(20)]
+@pytest.mark.parametrize(("method", "episodes"), [("importance", 4000), ("auto", 6000)])
+def test_a_rare_corner_is_estimated_with_a_gain(method: str, episodes: int) -> None:
+    """Twenty estimates by 4,000 vectors, of which Monte Carlo expects 0.4 to fail; or by 6,000."""
+    found = [played(made(method, Goal(episodes, NEVER), seed), corner) for seed in range(20)]
     last = [one.history[-1] for one in found]
     good = [one for one in last if not one.refused]
     assert len(good) >= 18
@@ -100,9 +100,18 @@ def test_importance_sampling_is_refused_where_nothing_can_be_learned() -> None:
     """Scattered failures: no interval is given; Monte Carlo takes over if it may."""
     last = [played(made("importance", Goal(2000, NEVER), s), scattered).history[-1] for s in (1, 2)]
     assert all(one.refused for one in last)
-    chosen = [played(made("auto", Goal(2000, NEVER), s), scattered).history[-1] for s in (1, 2)]
+    chosen = [played(made("auto", Goal(5000, NEVER), s), scattered).history[-1] for s in (1, 2)]
     assert not any(one.refused for one in chosen)
     assert all(one.lower <= 1e-3 <= one.upper for one in chosen)
+
+
+def test_few_episodes_are_not_spent_on_pilots() -> None:
+    """The automatic choice of fewer than 5,000 is Monte Carlo: the same vectors and estimates."""
+    goals = Goal(2000, 0.3), Goal(4999, NEVER)
+    for goal in goals:
+        chosen, plain = (played(made(m, goal, 3), corner) for m in ("auto", "monte-carlo"))
+        assert chosen.history == plain.history
+        assert chosen.gain() == (1.0, 1.0, 1.0)
 
 
 def test_looks_spend_the_error_once() -> None:
