@@ -20,10 +20,10 @@ import numpy as np
 
 from cavsumo.model.crosswalk import STARTS
 from cavsumo.probability.disturbed_crosswalk import DisturbedCrosswalk
+from cavsumo.probability.learned_splitting import REPLICAS, estimate_by_splitting
 from cavsumo.probability.monte_carlo import exact_estimate
 from cavsumo.probability.noisy import counted
 from cavsumo.probability.shifted import estimate_by_shifts
-from cavsumo.probability.splitting import REPLICAS, estimate_by_splitting
 from cavsumo.probability.weights import Estimate
 from cavsumo.probability.yielding_crosswalk import YieldingCrosswalk
 

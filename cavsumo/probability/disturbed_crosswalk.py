@@ -48,17 +48,6 @@ class DisturbedCrosswalk:
         last = np.where(failed, FAILED, RUNNING)[:, None]
         return np.concatenate([place, velocity, car, *seen, last], axis=1)
 
-    def score(self, states: Floats) -> Floats:
-        """The braking that the car would need, less what keeps both from meeting."""
-        (x, y), walk, (car, v, _) = states[:, PLACE].T, states[:, 3], states[:, CAR].T
-        zone, aside = crosswalk.ZONE_M
-        ahead = x - zone - car
-        needed = v * v / (2.0 * np.maximum(0.5, ahead))
-        until = np.maximum(0.0, np.abs(y) - aside) / np.maximum(0.3, walk)
-        late = np.abs(until - np.maximum(0.0, ahead) / np.maximum(v, 0.5))
-        passed = np.where(ahead < -2.0 * zone, 10.0, 0.0)
-        return np.where(states[:, -1] == FAILED, 100.0, needed - 2.0 * late - passed)
-
     def features(self, states: Floats) -> Floats:
         """Places, speeds and errors of the estimate, scaled."""
         x, y, wx, wy, car, v, chosen, qx, qy, ux, _, _ = states.T

@@ -17,6 +17,8 @@ from cavsumo.probability.weights import Estimate
 RUNNING, FAILED, ENDED = 0.0, 1.0, 2.0  # the last column of a state
 AT_ONCE = 20_000  # runs, so that the memory is bounded
 
+Visited = list[Floats]  # the running states of runs at each step
+
 
 class NoisyProcess(Protocol):
     """A process whose state is a row of numbers; many runs are moved together.
@@ -36,9 +38,6 @@ class NoisyProcess(Protocol):
 
     def moved(self, states: Floats, drawn: Floats) -> Floats:
         """The states after a step, for running states and numbers of shape (n, numbers)."""
-
-    def score(self, states: Floats) -> Floats:
-        """How near each state is to a failure, on any scale that increases."""
 
     def features(self, states: Floats) -> Floats:
         """The numbers that a proposal may depend on, about in [-1, 1], shape (n, features)."""

@@ -8,23 +8,22 @@ go on from there by chance. When fewer than k are left below a failure,
     p = (1 - K1 / N) (1 - K2 / N) ... * (share that failed)
 
 which is unbiased for any score (Brehier, Gazeau, Goudenege, Lelievre, Rousset 2016, Ann. Appl.
-Probab. 26, 3559). Its spread is not known from within, so the interval is a t interval of the mean
-of independent replicas.
+Probab. 26, 3559). The best score is the chance to fail (``learned_splitting``).
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 
-from cavsumo.probability.noisy import FAILED, RUNNING, NoisyProcess, SteppedEstimate
+from cavsumo.probability.noisy import FAILED, RUNNING, NoisyProcess, Visited
 from cavsumo.probability.tree import Floats, Ints
-from cavsumo.probability.weights import LEVEL, Estimate, normal_interval
 
-REPLICAS, RUNS, GIVEN_UP = 20, 200, 0.1
-LARGEST_SHARE = 0.3  # of the sum in one replica
-FEWEST_REPLICAS = 8.0  # effective number, for a t interval
+GIVEN_UP = 0.1  # share of the runs at a level
+
+Score = Callable[[Floats, int], Floats]  # of states after so many steps; any increasing scale
 
 
 @dataclass
@@ -33,14 +32,12 @@ class Replicas:
 
     Attributes:
         states: shape (replicas, runs, horizon + 1, columns); what ended stays where it ended.
-        drawn: the numbers of each step, shape (replicas, runs, horizon, numbers).
         best: the best score up to each moment, shape (replicas, runs, horizon + 1).
         weights: the product of the shares that were kept, of each replica.
         begun, steps: how many runs were begun, and how many steps were played.
     """
 
     states: Floats
-    drawn: Floats
     best: Floats
     weights: Floats
     begun: int = 0
@@ -58,24 +55,15 @@ class Replicas:
         found: Floats = self.weights * self.failed.mean(1)
         return found
 
-
-def estimate_by_splitting(
-    process: NoisyProcess,
-    rng: np.random.Generator,
-    replicas: int = REPLICAS,
-    runs: int = RUNS,
-    level: float = LEVEL,
-) -> SteppedEstimate:
-    """The probability that a process fails, by independent replicas of so many runs.
-
-    Refused where few of the replicas carry the estimate.
-    """
-    found = split(process, rng, replicas, runs)
-    return SteppedEstimate(_estimate(found, level), found.steps)
+    def visited(self) -> Visited:
+        """The running states of all runs at each step."""
+        steps = self.states.reshape(-1, *self.states.shape[2:]).swapaxes(0, 1)
+        return [step[step[:, -1] == RUNNING] for step in steps[:-1]]
 
 
 def split(
     process: NoisyProcess,
+    score: Score,
     rng: np.random.Generator,
     replicas: int,
     runs: int,
@@ -84,13 +72,13 @@ def split(
     """Split runs until nearly all of each replica fail, or all have the same best score."""
     found = _begun(process, replicas, runs)
     rows = np.arange(replicas * runs)
-    _play(process, found, rows, np.zeros(len(rows), dtype=int), rng)
+    _play(process, score, found, rows, np.zeros(len(rows), dtype=int), rng)
     least = max(1, int(given_up * runs))
     active = np.arange(replicas)
     while len(active):
         active, rows, starts = _branched(found, active, least, rng)
         if len(rows):
-            _play(process, found, rows, starts, rng)
+            _play(process, score, found, rows, starts, rng)
     return found
 
 
@@ -101,7 +89,6 @@ def _begun(process: NoisyProcess, replicas: int, runs: int) -> Replicas:
     shape = (replicas, runs)
     return Replicas(
         states=states.reshape(*shape, *states.shape[1:]),
-        drawn=np.zeros((*shape, process.horizon, process.numbers)),
         best=np.zeros((*shape, process.horizon + 1)),
         weights=np.ones(replicas),
     )
@@ -127,7 +114,6 @@ def _branched(
         for mine, parent, start in zip(lost, parents, at, strict=True):
             for kind in (found.states, found.best):
                 kind[one, mine, : start + 1] = kind[one, parent, : start + 1]
-            found.drawn[one, mine, :start] = found.drawn[one, parent, :start]
         going.append(int(one))
         rows += list(one * runs + lost)
         starts += list(at)
@@ -135,41 +121,25 @@ def _branched(
 
 
 def _play(
-    process: NoisyProcess, found: Replicas, rows: Ints, starts: Ints, rng: np.random.Generator
+    process: NoisyProcess,
+    score: Score,
+    found: Replicas,
+    rows: Ints,
+    starts: Ints,
+    rng: np.random.Generator,
 ) -> None:
     """Play runs, by their numbers, from moments on."""
     flat = found.best.shape[0] * found.best.shape[1]
     states, best = found.states.reshape(flat, *found.states.shape[2:]), found.best.reshape(flat, -1)
-    drawn = found.drawn.reshape(flat, *found.drawn.shape[2:])
     at_first = rows[starts == 0]
-    best[at_first, 0] = process.score(states[at_first, 0])
+    best[at_first, 0] = score(states[at_first, 0], 0)
     for step in range(int(starts.min()), process.horizon):
         now = rows[starts <= step]
         go = now[states[now, step, -1] == RUNNING]
         states[now, step + 1], best[now, step + 1] = states[now, step], best[now, step]
-        drawn[now, step] = 0.0
         if len(go):
-            drawn[go, step] = rng.standard_normal((len(go), process.numbers))
-            states[go, step + 1] = process.moved(states[go, step], drawn[go, step])
-            best[go, step + 1] = np.maximum(best[go, step], process.score(states[go, step + 1]))
+            drawn = rng.standard_normal((len(go), process.numbers))
+            states[go, step + 1] = process.moved(states[go, step], drawn)
+            best[go, step + 1] = np.maximum(best[go, step], score(states[go, step + 1], step + 1))
         found.steps += len(go)
     found.begun += len(rows)
-
-
-def _estimate(found: Replicas, level: float) -> Estimate:
-    """The mean of the replicas, with a t interval."""
-    each = found.estimates
-    mean, error = float(each.mean()), float(each.std(ddof=1)) / len(each) ** 0.5
-    lower, upper = normal_interval(mean, error, len(each) - 1, level)
-    total = float(each.sum())
-    largest = float(each.max()) / total if total > 0.0 else 1.0
-    effective = total**2 / float((each**2).sum()) if total > 0.0 else 0.0
-    refused = ""
-    if total == 0.0:
-        refused = "no replica reached a failure"
-    elif largest > LARGEST_SHARE:
-        refused = f"one replica carries {largest:.0%} of the sum"
-    elif effective < FEWEST_REPLICAS:
-        refused = f"the replicas are worth only {effective:.1f}"
-    failures = int(found.failed.sum())
-    return Estimate(mean, lower, upper, level, found.begun, failures, effective, largest, refused)

@@ -77,15 +77,6 @@ class YieldingCrosswalk:
         now[:, -1] = np.where(touching & (v > MOVING_MPS), FAILED, np.where(over, ENDED, RUNNING))
         return now
 
-    def score(self, states: Floats) -> Floats:
-        """How near to the car the pedestrian will come in its strip, walking on as now [m]."""
-        s, t, vs, vt, x, _, status = states.T
-        left = -FIRST_Y_M + (CAR_M[1] + BODY_M) / 2 - s
-        late = t + vt * np.maximum(0.0, left) / np.maximum(0.3, vs)
-        apart = CROSSWALK_X_M - late - x - (CAR_M[0] + BODY_M) / 2
-        past = np.where(left < 0.0, 5.0 - left, 0.0)
-        return np.where(status == FAILED, 100.0, -np.maximum(0.0, apart) - past)
-
     def features(self, states: Floats) -> Floats:
         """Places and speeds, scaled."""
         s, t, vs, vt, x, v, _ = states.T

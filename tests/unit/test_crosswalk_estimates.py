@@ -6,10 +6,13 @@ import dataclasses
 
 import numpy as np
 import pytest
+from scipy.stats import norm
 
 from cavsumo.model.crosswalk import STARTS, failures
-from cavsumo.probability import shifted
+from cavsumo.probability import failure_chances, learned_splitting, shifted
 from cavsumo.probability.disturbed_crosswalk import DisturbedCrosswalk
+from cavsumo.probability.failure_chances import explored_states, learned_chances
+from cavsumo.probability.learned_splitting import estimate_by_splitting
 from cavsumo.probability.noisy import ENDED, FAILED, RUNNING, NoisyProcess, counted
 from cavsumo.probability.shifted import (
     estimate_by_shifts,
@@ -18,7 +21,7 @@ from cavsumo.probability.shifted import (
     shifted_runs,
 )
 from cavsumo.probability.shifts import IN_SQUARES, IN_TIME, FailingRuns, fitted, latest
-from cavsumo.probability.splitting import estimate_by_splitting, split
+from cavsumo.probability.splitting import split
 from cavsumo.probability.tree import Floats
 from cavsumo.probability.yielding_crosswalk import (
     YieldingCrosswalk,
@@ -45,16 +48,30 @@ class Sum:
         last = np.where(time < 10.0, RUNNING, np.where(total > 8.0, FAILED, ENDED))
         return np.stack([time, total, last], axis=1)
 
-    def score(self, states: Floats) -> Floats:
-        """The sum so far, less what remains to be gained as the time runs out."""
-        return np.where(states[:, 2] == FAILED, 100.0, states[:, 1] + 0.5 * (10.0 - states[:, 0]))
-
     def features(self, states: Floats) -> Floats:
         """The sum, scaled."""
         return states[:, 1:2] / 5.0
 
 
 SUM_P = 0.005706  # 1 - Phi(8 / sqrt(10))
+
+
+class Never(Sum):
+    """The sum, where nothing fails."""
+
+    def moved(self, states: Floats, drawn: Floats) -> Floats:
+        """As for the sum; a run that failed there has ended."""
+        found = super().moved(states, drawn)
+        found[:, 2] = np.where(found[:, 2] == FAILED, ENDED, found[:, 2])
+        return found
+
+
+@pytest.fixture
+def few_runs(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Two rounds of learning from few runs."""
+    monkeypatch.setattr(learned_splitting, "EXPLORED", 1000)
+    monkeypatch.setattr(learned_splitting, "ROUNDS", 2)
+    monkeypatch.setattr(learned_splitting, "PILOTS", (2, 100))
 
 
 def played(process: NoisyProcess, numbers: Floats) -> Floats:
@@ -119,27 +136,44 @@ def test_runs_by_chance_are_counted() -> None:
     assert found.failures == pytest.approx(40_000 * SUM_P, abs=60)
 
 
-def test_splitting_is_unbiased_and_repeats() -> None:
-    """Many small replicas: their mean is the probability; the same generator, the same digits."""
-    found = split(Sum(), np.random.default_rng(2), 300, 40)
+def test_splitting_is_unbiased() -> None:
+    """Many small replicas by a crude score: their mean is the probability."""
+
+    def score(states: Floats, step: int) -> Floats:
+        return np.where(states[:, 2] == FAILED, 100.0, states[:, 1] + 0.5 * (10.0 - step))
+
+    found = split(Sum(), score, np.random.default_rng(2), 300, 40)
     error = found.estimates.std() / 300**0.5
     assert abs(found.estimates.mean() - SUM_P) < 4.0 * error
     assert error < 0.1 * SUM_P
-    one, two = (estimate_by_splitting(Sum(), np.random.default_rng(5), 20, 50) for _ in range(2))
-    assert one == two
-    assert one.estimate.refused == ""
-    assert one.estimate.lower <= SUM_P <= one.estimate.upper
-    assert one.estimate.episodes > 1000
 
 
-def test_splitting_is_refused_where_nothing_is_reached() -> None:
-    """A score that never rises: all runs of a replica have the same best one."""
+def test_the_chances_to_fail_are_learned() -> None:
+    """Those of the sum, 1 - Phi((8 - sum) / sqrt(steps that are left)), by less than a factor e."""
+    rng = np.random.default_rng(3)
+    learned = learned_chances(Sum(), explored_states(Sum(), 3000, rng), rng)
+    for step, total in ((0, 0.0), (4, 3.0), (4, -1.0), (8, 5.0), (9, 7.5)):
+        found = learned.chances.log(np.array([[step, total, RUNNING]]), step)[0]
+        exact = norm.logsf((8.0 - total) / (10.0 - step) ** 0.5)
+        assert found == pytest.approx(exact, abs=1.0)
+    ended = np.array([[10.0, 9.0, FAILED], [10.0, 1.0, ENDED]])
+    assert learned.chances.log(ended, 10).tolist() == [0.0, failure_chances.FLOOR]
 
-    class Flat(Sum):
-        def score(self, states: Floats) -> Floats:
-            return np.where(states[:, 2] == FAILED, 100.0, 0.0)
 
-    found = estimate_by_splitting(Flat(), np.random.default_rng(1), 5, 10)
+def test_splitting_by_learned_chances_covers_and_repeats(few_runs: None) -> None:
+    """Ten estimates: at most one interval misses; the same generator, the same digits."""
+    found = [estimate_by_splitting(Sum(), np.random.default_rng(s), 10, 100) for s in range(10)]
+    assert found[3] == estimate_by_splitting(Sum(), np.random.default_rng(3), 10, 100)
+    each = [one.estimate for one in found]
+    assert not any(one.refused for one in each)
+    assert sum(one.lower <= SUM_P <= one.upper for one in each) >= 9
+    assert np.mean([one.p for one in each]) == pytest.approx(SUM_P, rel=0.1)
+    assert all(one.episodes > 1000 for one in each)
+
+
+def test_splitting_is_refused_where_nothing_is_reached(few_runs: None) -> None:
+    """Nothing fails, so nothing is learned and nothing is claimed."""
+    found = estimate_by_splitting(Never(), np.random.default_rng(1), 5, 10)
     assert found.estimate.refused == "no replica reached a failure"
 
 
@@ -197,13 +231,6 @@ def test_a_shift_is_fitted_to_numbers_that_depend_on_the_state() -> None:
 
 def test_shifts_are_refused_without_failures(monkeypatch: pytest.MonkeyPatch) -> None:
     """Nothing fails, so nothing is learned and nothing is claimed."""
-
-    class Never(Sum):
-        def moved(self, states: Floats, drawn: Floats) -> Floats:
-            found = super().moved(states, drawn)
-            found[:, 2] = np.where(found[:, 2] == FAILED, ENDED, found[:, 2])
-            return found
-
     monkeypatch.setattr(shifted, "EXPLORED", 100)
     monkeypatch.setattr(shifted, "LEARNED", (100,))
     found = estimate_by_shifts(Never(), np.random.default_rng(1), 100)
