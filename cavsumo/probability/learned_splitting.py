@@ -5,8 +5,8 @@
 3. Split a few runs by these chances; they visit states nearer to failures. Learn again, five times.
 4. Estimate by independent replicas that learn nothing.
 
-An estimate is unbiased whatever was learned. Its spread is not known from within a replica, so the
-interval is a t interval of their mean.
+An estimate is unbiased even where the chances are wrong. Its spread is not known from within a
+replica, so the interval is a t interval of their mean.
 """
 
 from __future__ import annotations
