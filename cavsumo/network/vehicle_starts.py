@@ -117,6 +117,19 @@ def vehicle_start(
         lead: how much earlier than the ego it arrives, or how far ahead it drives [s].
         start_speed: in place of the pace [m/s].
     """
+    along, v = arrival(approach, kind, ego_length, pace, lead, start_speed)
+    return _placed(approach, along, v, start_speed)
+
+
+def arrival(
+    approach: Approach,
+    kind: Kind,
+    ego_length: float,
+    pace: float,
+    lead: float,
+    start_speed: float | None = None,
+) -> tuple[float, float]:
+    """Where ``vehicle_start`` starts on the approach [m], and its speed on the way [m/s]."""
     v = _speed(approach, kind, pace, start_speed)
     until = approach.ego_enter / approach.ego_speed  # when the ego is there [s]
     if math.isfinite(approach.wait):
@@ -125,7 +138,7 @@ def vehicle_start(
         ahead = lead * approach.ego_speed
         along = approach.enter + ahead + (ego_length + kind.length) / 2 - v * until
     first, last = _room(approach, kind)
-    return _placed(approach, max(first, min(along, last)), v, start_speed)
+    return max(first, min(along, last)), v
 
 
 def _speed(approach: Approach, kind: Kind, pace: float, start_speed: float | None) -> float:

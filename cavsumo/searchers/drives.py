@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from itertools import compress
 from typing import ClassVar
 
 from cavsumo.agents.cues import zone_m
@@ -17,7 +18,7 @@ from cavsumo.model.geometry import Box, gap
 from cavsumo.model.kinematics import wrap
 from cavsumo.model.polyline import Path
 from cavsumo.network.site import Site
-from cavsumo.network.vehicle_starts import APART_M, lead_range, pace_range, vehicle_start
+from cavsumo.network.vehicle_starts import APART_M, arrival, lead_range, pace_range, vehicle_start
 from cavsumo.searchers.places import (
     FROM_LEFT,
     FROM_RIGHT,
@@ -80,21 +81,29 @@ class Drives:
 
         The vehicle drives up to its line first; the ego is expected to drive at the limit.
         """
-        return tuple(p for p in self.places if self._in_time(p, shares)) or self.places
+        return tuple(compress(self.places, self._in_time(shares))) or self.places
 
-    def _in_time(self, place: Place, shares: Mapping[str, float]) -> bool:
-        """Whether the ego is still to come when a vehicle has to begin at its line."""
-        placed, drive = self.realised(place, shares)
-        start, approach = placed.start, placed.start.approach
+    def _in_time(self, shares: Mapping[str, float]) -> Iterator[bool]:
+        """For each place, whether the ego is still to come when a vehicle begins at its line."""
+        drive, known = drive_of(shares, self.kind), dict[int, tuple[float, float]]()
+        for place in self.places:
+            approach = place.start.approach
+            assert approach is not None
+            if not math.isfinite(approach.wait):
+                yield True
+                continue
+            if id(approach) not in known:  # hundreds of places share a few approaches
+                known[id(approach)] = _from_line(approach, drive), _until_cue(approach, drive)
+            from_line, until_cue = known[id(approach)]
+            way = approach.wait - self._arrival(place, shares)
+            yield way / min(self.kind.v_max, approach.speed) + from_line <= until_cue
+
+    def _arrival(self, place: Place, shares: Mapping[str, float]) -> float:
+        """Where a vehicle starts on the approach of a place [m]."""
+        approach = place.start.approach
         assert approach is not None
-        if not math.isfinite(approach.wait):
-            return True
-        assert not isinstance(drive.cue, str)
-        along = approach.path.project(start.x, start.y).along
-        at_line = (approach.wait - along) / min(self.kind.v_max, approach.speed)
-        v = approach.ego_speed
-        left = approach.ego_enter - zone_m(drive.cue, v)
-        return at_line + _from_line(approach, drive) <= left / v
+        pace = within(pace_range(approach), shares["pace"])
+        return arrival(approach, self.kind, self.ego.length, pace, place.lead, self.start_speed)[0]
 
     def realised(self, place: Place, shares: Mapping[str, float]) -> tuple[Place, DriveProgramme]:
         """The place with a start of its own pace, and the programme of the numbers."""
@@ -150,6 +159,12 @@ def _from_line(approach: Approach, drive: DriveProgramme) -> float:
         + drive.pause
         + math.sqrt(-2.0 * drive.depth / drive.gaining)
     )
+
+
+def _until_cue(approach: Approach, drive: DriveProgramme) -> float:
+    """Time until the ego, at the limit, is where a vehicle begins [s]."""
+    assert not isinstance(drive.cue, str)
+    return (approach.ego_enter - zone_m(drive.cue, approach.ego_speed)) / approach.ego_speed
 
 
 def _zones(programme: DriveProgramme, crosses: bool) -> tuple[float, float]:

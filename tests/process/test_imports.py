@@ -28,6 +28,12 @@ def test_the_process_that_waits_has_no_sumo() -> None:
     assert "libsumo" not in loaded_by("cavsumo.batch.playing, cavsumo.cli.commands.run")
 
 
+def test_a_process_that_plays_starts_without_scipy() -> None:
+    """Each batch starts some: what only summaries and games need is not loaded."""
+    player = "cavsumo.batch.worker_process, cavsumo.batch.episode_server"
+    assert "scipy" not in loaded_by(f"{player}, cavsumo.batch.episode_runner")
+
+
 def test_the_plugin_of_pytest_is_light() -> None:
     """Pytest loads it wherever cavsumo is installed."""
     assert not HEAVY & loaded_by("cavsumo.kept.pytest_plugin")
