@@ -36,6 +36,7 @@ DEPTHS_M = (-1.5, 3.0)
 LONGEST_M = 5.0  # of the second leg
 
 Numbers = NDArray[np.float64]
+Few = tuple[Numbers, NDArray[np.intp]]
 
 
 @dataclass(frozen=True)
@@ -88,10 +89,10 @@ class Walks:
         """The places where the ego is still to come when a body has to step off for a programme."""
         if isinstance(walk.cue, str):
             return self.places
-        along, limit, aways, which = self._ways
-        entered = np.array([entry_of(walk, away, self.kind) for away in aways])[which]
-        zone = np.array([zone_m(walk.cue, v) for v in limit.tolist()])
-        in_time = along + entered[:, 1] >= limit * entered[:, 0] + zone
+        along, (limits, of_limit), (aways, of_away) = self._ways
+        entered = np.array([entry_of(walk, away, self.kind) for away in aways.tolist()])[of_away]
+        zone = np.array([zone_m(walk.cue, v) for v in limits.tolist()])[of_limit]
+        in_time = along + entered[:, 1] >= limits[of_limit] * entered[:, 0] + zone
         return tuple(compress(self.places, in_time))
 
     def realised(self, place: Place, shares: Mapping[str, float]) -> tuple[Place, WalkProgramme]:
@@ -99,15 +100,15 @@ class Walks:
         return place, walk_of(shares, self.kind)
 
     @cached_property
-    def _ways(self) -> tuple[Numbers, Numbers, list[float], NDArray[np.intp]]:
-        """Where each place meets the ego's path [m] and the limit there [m/s]; distances.
+    def _ways(self) -> tuple[Numbers, Few, Few]:
+        """Where each place meets the ego's path [m], the limits there [m/s], the ways to the strip.
 
-        The distances from the ego's strip are few [m]: then which of them is that of each place.
+        The last two have few different values: those, and which of them is that of each place.
         """
         along = np.array([place.along for place in self.places])
         limits = [[0.0, *(one.speed for one in self.limits if one.along <= at)][-1] for at in along]
-        aways, which = np.unique([round(p.away, 2) for p in self.places], return_inverse=True)
-        return along, np.array(limits), aways.tolist(), which
+        aways = [round(place.away, 2) for place in self.places]  # [m]
+        return along, np.unique(limits, return_inverse=True), np.unique(aways, return_inverse=True)
 
     def fits(self, place: Place, others: Sequence[Place]) -> bool:
         """Whether a body can start at a place, apart from others."""
