@@ -21,7 +21,6 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from cavsumo.assertions.metrics.plane import ttc_boxes
-from cavsumo.assertions.metrics.touching import areas
 
 Numbers = NDArray[np.float64]
 Places = NDArray[np.intp]
@@ -222,12 +221,16 @@ def _areas(i: Places, j: Places, mine: Numbers, theirs: Numbers) -> float:
         i, j: which pieces cross, shape (n,); those next to each other are of one area.
         mine, theirs: from when until when each body is in what the other's piece sweeps, (2, n).
     """
-    area = areas(i, j)
-    count = int(area.max()) + 1
+    from scipy import ndimage  # a fifth of the start of a process that plays
+
+    touched = np.zeros((np.ptp(i) + 1, np.ptp(j) + 1), dtype=bool)
+    here = i - i.min(), j - j.min()
+    touched[here] = True
+    labels, count = ndimage.label(touched, np.ones((3, 3)))
     enter, leave = np.full((2, count), math.inf), np.full((2, count), -math.inf)
     for body, (begin, end) in enumerate((mine, theirs)):
-        np.minimum.at(enter[body], area, begin)
-        np.maximum.at(leave[body], area, end)
+        np.minimum.at(enter[body], labels[here] - 1, begin)
+        np.maximum.at(leave[body], labels[here] - 1, end)
     return max(0.0, float((enter[::-1] - leave).max(axis=0).min()))
 
 
