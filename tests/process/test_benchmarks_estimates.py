@@ -9,6 +9,8 @@ import pytest
 from scripts_played import Play, numbers
 from support import ROOT
 
+from cavsumo.probability import shifted
+
 pytestmark = pytest.mark.usefixtures("inline")
 
 
@@ -76,8 +78,9 @@ def test_drivers_under_an_exposure(play: Play, monkeypatch: pytest.MonkeyPatch) 
     assert rows[1].split(" | ")[3] == "0"
 
 
-def test_crosswalks(play: Play) -> None:
+def test_crosswalks(play: Play, monkeypatch: pytest.MonkeyPatch) -> None:
     """One estimate by each method on a starting point, with a truth that is given."""
+    monkeypatch.setattr(shifted, "LEARNED", (500,))
     words = "start-2", "--counted", "107", "10000", "--runs", "200", "--replications", "1"
     truth, _, *found = play("crosswalks", *words).splitlines()
     assert truth.startswith("start-2: 107 failures in 10000 episodes: 0.0107 [")

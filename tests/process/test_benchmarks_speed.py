@@ -2,7 +2,12 @@
 
 from __future__ import annotations
 
+import itertools
+from pathlib import Path
+from typing import Any
+
 import pytest
+from inline import cavsumo
 from scripts_played import Play, numbers
 from support import CHROMIUM, ROOT, benchmark
 
@@ -102,24 +107,52 @@ def test_refusals(play: Play) -> None:
 
 
 def test_scale(play: Play, capsys: pytest.CaptureFixture[str]) -> None:
-    """Four episodes for eight rows, read by this checkout twice."""
+    """Two episodes for four rows, merged by this checkout twice."""
     with pytest.raises(SystemExit) as ended:
-        play("scale", "--rows", "8", "--played", "2", "--other", str(ROOT))
+        play("scale", "--rows", "4", "--played", "1", "--what", "merge", "--other", str(ROOT))
     said = capsys.readouterr().out
     assert ended.value.code == 0, said
-    assert said.count("the same bytes") == 3
+    assert said.splitlines()[-1].startswith("merge")
+    assert numbers(said.splitlines()[-1])[0] > 0.0
+    assert said.count("the same bytes") == 1
+
+
+def test_scale_of_all_commands(play: Play, capsys: pytest.CaptureFixture[str]) -> None:
+    """Each of them twice, in the process of this test: other bytes are told."""
+    scale = benchmark("scale")
+    answers = itertools.count()
+
+    def run(_: Path, words: list[str], folder: Path) -> tuple[Any, bytes]:
+        done = cavsumo(folder, *words)
+        assert done.returncode == 0, done.stderr
+        own = f"{next(answers)}" if words[0] == "merge" else done.stdout
+        return scale.Spent(1.0, 1.0), own.encode()
+
+    with pytest.raises(SystemExit) as ended:
+        play("scale", "--rows", "4", "--played", "1", "--other", str(ROOT), run=run)
+    said = capsys.readouterr().out
+    assert ended.value.code == 1, said
+    assert [line.split()[0] for line in said.splitlines()[1:]] == ["report", "merge", "resume"]
+    assert said.count("the same bytes") == 2
+    assert said.count("OTHER BYTES") == 1
+
+
+SPEED = ["--net", NET, "--testers", "1", "--rounds", "1"]
 
 
 def test_speed(play: Play) -> None:
-    """Two episodes of this version beside itself, and the command."""
-    words = ["--net", NET, "--testers", "1", "--episodes", "2", "--rounds", "1"]
-    said = play("speed", *words, "--other", str(ROOT))
-    lines = said.splitlines()
-    assert len(lines) == 3
-    for line in lines[1:]:
-        bare, *others = numbers(line.partition(ROOT.name)[2])
-        assert bare > 0.0
-        assert len(others) == 6  # alone, whole, command, each with its ratio
+    """Two episodes of this version, and the command."""
+    _, line = play("speed", *SPEED, "--episodes", "2").splitlines()
+    bare, *others = numbers(line.partition(ROOT.name)[2])
+    assert bare > 0.0
+    assert len(others) == 6  # alone, whole, command, each with its ratio
+
+
+def test_speed_beside_another_version(play: Play) -> None:
+    """An episode of this version beside itself, without the command."""
+    words = [*SPEED, "--episodes", "1", "--no-command"]
+    _, *lines = play("speed", *words, "--other", str(ROOT)).splitlines()
+    assert [len(numbers(line.partition(ROOT.name)[2])) for line in lines] == [5, 5]
 
 
 def test_throughput(play: Play) -> None:

@@ -55,7 +55,7 @@ def test_rows_and_traces_are_the_same(
     """In forks of two processes, in the process of this test, or resumed in the middle."""
     monkeypatch.chdir(tmp_path)
     words = ["run", "-n", str(large), "--traffic", "4,4", "--agent", "timing", "--agent", "random"]
-    words += ["--runs", "4", "--trace", "all", "--end", "8", "--exit-zero"]
+    words += ["--runs", "2", "--trace", "all", "--end", "8", "--exit-zero"]
     with played_here():
         assert main([*words, "-q", "-o", "here.csv"]) == 0
     assert main([*words, "-j", "2", "-o", "forks.csv"]) == 0

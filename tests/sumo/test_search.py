@@ -23,7 +23,7 @@ from cavsumo.results.traces import read_trace
 from cavsumo.searchers.space import space_of
 
 Capture = pytest.CaptureFixture[str]
-RUNS = 32
+RUNS = 20
 
 
 def _search(file: Path, *more: str, runs: int = RUNS, net: str = "pedestrians") -> int:
@@ -71,12 +71,12 @@ def test_rows_do_not_depend_on_how_it_is_played(found: Path, tmp_path: Path) -> 
 def test_every_searcher_is_continued_from_its_rows(method: str, tmp_path: Path) -> None:
     """Its state is what it was told, in the order of the episodes; a row says how it is played."""
     whole = _folder(tmp_path / "whole")
-    _search(whole, "--method", method, runs=24)
-    _continued(whole, tmp_path / "half", "--method", method, runs=24)
+    _search(whole, "--method", method, runs=18)
+    _continued(whole, tmp_path / "half", "--method", method, runs=18)
     played = rows(whole)
     decided = [row["situations"] for row in played if row["situations"]]
     assert bool(decided) is (method != "diversity")
-    assert main(["replay", str(whole), "21"]) == 0
+    assert main(["replay", str(whole), "16"]) == 0
 
 
 def test_a_search_finds_preventable_failures(found: Path) -> None:
@@ -107,8 +107,8 @@ def test_vehicles_are_searched_and_replayed(kind: str, tmp_path: Path, capsys: C
     """With a second one; rows two at a time, and replays from trace and rows, are the same."""
     one, both = (_folder(tmp_path / name) for name in ("one", "both"))
     words = ["--kind", kind, "--testers", "2", "--exit-zero"]
-    assert _search(one, *words, runs=12, net="crossing") == 0
-    assert _search(both, *words, "-j", "2", "--trace", "none", runs=12, net="crossing") == 0
+    assert _search(one, *words, runs=10, net="crossing") == 0
+    assert _search(both, *words, "-j", "2", "--trace", "none", runs=10, net="crossing") == 0
     bare = [row | {"trace": ""} for row in rows(one)]
     assert rows(both) == bare
     failed = [row for row in rows(one) if row["outcome"] == "violated"]
@@ -159,8 +159,8 @@ def test_a_search_begins_with_what_an_earlier_one_found(
     """Its best points are played first; decisions are no points of a search by programmes."""
     earlier = ["--param", f"search.earlier={found}", "--method", method]
     whole = _folder(tmp_path / "whole")
-    assert _search(whole, *earlier, runs=24) == Exit.VIOLATED
-    _continued(whole, tmp_path / "half", *earlier, runs=24)
+    assert _search(whole, *earlier, runs=18) == Exit.VIOLATED
+    _continued(whole, tmp_path / "half", *earlier, runs=18)
     first, best = rows(whole)[0], max(rows(found), key=lambda row: float(row["grade"]))
     assert bool(first["situations"]) is (method == "explore")
     assert method == "explore" or _point(whole, first) == _point(found, best)
@@ -253,8 +253,8 @@ def test_a_bounded_search_is_continued(tmp_path: Path) -> None:
     """All bodies come from one side, slowly; the same rows after an interruption."""
     bounds = "--param", "search.within=side=left speed=0.3:0.6", "--exit-zero"
     whole = _folder(tmp_path / "whole")
-    assert _search(whole, *bounds, runs=24) == 0
-    _continued(whole, tmp_path / "half", *bounds, runs=24)
+    assert _search(whole, *bounds, runs=18) == 0
+    _continued(whole, tmp_path / "half", *bounds, runs=18)
     met = [row for row in rows(whole) if row["from_side"]]
     assert {row["from_side"] for row in met} <= {"left"}
     assert met
