@@ -9,7 +9,7 @@ import pytest
 from scripts_played import Play, numbers
 from support import ROOT
 
-from cavsumo.probability import shifted
+from cavsumo.probability import learned_splitting, shifted
 
 pytestmark = pytest.mark.usefixtures("inline")
 
@@ -81,6 +81,7 @@ def test_drivers_under_an_exposure(play: Play, monkeypatch: pytest.MonkeyPatch) 
 def test_crosswalks(play: Play, monkeypatch: pytest.MonkeyPatch) -> None:
     """One estimate by each method on a starting point, with a truth that is given."""
     monkeypatch.setattr(shifted, "LEARNED", (500,))
+    monkeypatch.setattr(learned_splitting, "ROUNDS", 1)
     words = "start-2", "--counted", "107", "10000", "--runs", "200", "--replications", "1"
     truth, _, *found = play("crosswalks", *words).splitlines()
     assert truth.startswith("start-2: 107 failures in 10000 episodes: 0.0107 [")
