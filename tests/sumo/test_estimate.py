@@ -62,7 +62,7 @@ def test_digits_do_not_depend_on_how_it_is_played(
     assert _estimate(both, "-q", "-j", "2", *often) == Exit.OK
     assert rows(both) == rows(found)
     parts = shutil.copytree(folder, tmp_path / "cut") / found.name
-    kept = parts.read_bytes().splitlines(keepends=True)[: 1 + 17]
+    kept = parts.read_bytes().splitlines(keepends=True)[: 1 + 57]
     parts.write_bytes(b"".join(kept))
     assert estimated(parts).refused == "it was cut short; --resume goes on"
     assert _estimate(parts, "-q", "--resume", *often) == Exit.OK
@@ -109,9 +109,9 @@ def test_the_result_is_that_of_the_rows(found: Path, folder: Path, capsys: Captu
 
 def test_every_kind_of_violation_has_an_interval(folder: Path, capsys: Capture) -> None:
     """Those of two assertions, by the same method; the headline is as without the second."""
-    words = "--exposure", str(folder / "often.toml"), "--method", "monte-carlo"
+    words, most = ("--exposure", str(folder / "often.toml"), "--method", "monte-carlo"), 40
     more = "--assert", "reaction-zone", "--assert", "collision"
-    assert _estimate(folder / "two.csv", *words, *more, "-q", "--json") == Exit.OK
+    assert _estimate(folder / "two.csv", *words, *more, "-q", "--json", most=most) == Exit.OK
     said = json.loads(capsys.readouterr().out)
     found = {(one["assertion"], one["kind"]): one for one in said["by_assertion"]}
     played = rows(folder / "two.csv")
@@ -119,7 +119,7 @@ def test_every_kind_of_violation_has_an_interval(folder: Path, capsys: Capture) 
         violated = [row for row in played if f"{name}=violated" in row["verdicts"].split()]
         one = found[name, "violated"]
         assert one["episodes"] == len(violated)
-        assert one["p"] == pytest.approx(len(violated) / MOST)
+        assert one["p"] == pytest.approx(len(violated) / most)
         assert one["lower"] <= one["p"] <= one["upper"]
         assert one["per_hour"]["value"] == pytest.approx(60 * one["p"])
         kinds = [k for n, k in found if n == name and k not in ("violated", "unfair")]

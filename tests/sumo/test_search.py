@@ -23,7 +23,7 @@ from cavsumo.results.traces import read_trace
 from cavsumo.searchers.space import space_of
 
 Capture = pytest.CaptureFixture[str]
-RUNS = 20
+RUNS = 32
 
 
 def _search(file: Path, *more: str, runs: int = RUNS, net: str = "pedestrians") -> int:
