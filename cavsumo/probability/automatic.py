@@ -68,6 +68,8 @@ class Automatic:
         return self._weighted.of(happened)
 
     def gain(self) -> tuple[float, float, float]:
+        if self._plain is not None and not self._spent:
+            return self._plain.gain()
         if self._plain is not None:
             share = self._plain.played / (self._plain.played + self._spent)
             return share, share, share

@@ -62,7 +62,7 @@ def test_digits_do_not_depend_on_how_it_is_played(
     assert _estimate(both, "-q", "-j", "2", *often) == Exit.OK
     assert rows(both) == rows(found)
     parts = shutil.copytree(folder, tmp_path / "cut") / found.name
-    kept = parts.read_bytes().splitlines(keepends=True)[: 1 + 57]
+    kept = parts.read_bytes().splitlines(keepends=True)[: 1 + 17]
     parts.write_bytes(b"".join(kept))
     assert estimated(parts).refused == "it was cut short; --resume goes on"
     assert _estimate(parts, "-q", "--resume", *often) == Exit.OK

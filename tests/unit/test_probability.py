@@ -107,6 +107,7 @@ def test_importance_sampling_is_refused_where_nothing_can_be_learned() -> None:
 
 def test_few_episodes_are_not_spent_on_pilots() -> None:
     """The automatic choice of fewer than 5,000 is Monte Carlo: the same vectors and estimates."""
+    assert made("auto", Goal(2000), 3).gain() == (1.0, 1.0, 1.0)  # before the first look
     goals = Goal(2000, 0.3), Goal(4999, NEVER)
     for goal in goals:
         chosen, plain = (played(made(m, goal, 3), corner) for m in ("auto", "monte-carlo"))
