@@ -2,7 +2,7 @@
 
 1. Play runs whose numbers are spread wider than by chance.
 2. Learn the chance to fail from the states that were visited (``failure_chances``).
-3. Split a few runs by these chances; they visit states nearer to failures. Learn again: five rounds.
+3. Split a few runs by these chances; they visit states nearer to failures. Learn again, in rounds.
 4. Estimate by independent replicas that learn nothing.
 
 An estimate is unbiased even where the chances are wrong. Its spread is not known from within a
