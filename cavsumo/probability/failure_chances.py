@@ -7,8 +7,8 @@ where it has ended::
 
 At each step some states that runs have visited are moved several times by chance, and the mean of V
 after that is regressed on the features of the state: log V is a polynomial (all products of two,
-and cubes), fitted by gamma regression (McCullagh and Nelder 1989, Generalized Linear Models,
-chapter 8), so that relative errors count alike where the chance is 1e-6 and where it is 0.1.
+and cubes), fitted with a logarithmic link as a generalized linear model (McCullagh and Nelder 1989,
+chapter 8). Relative errors count alike, except where a chance is much smaller than the mean.
 
 What is wrong with it costs an estimate that is built on it precision, not correctness.
 """
