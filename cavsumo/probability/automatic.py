@@ -16,7 +16,7 @@ import numpy as np
 
 from cavsumo.probability.importance import PILOTS, Pilots, WeightedEstimation
 from cavsumo.probability.monte_carlo import MonteCarlo
-from cavsumo.probability.protocol import Goal, PlayedVector
+from cavsumo.probability.protocol import Estimator, Goal, PlayedVector
 from cavsumo.probability.tree import Bools, Floats
 from cavsumo.probability.weights import Estimate
 
@@ -24,6 +24,13 @@ AIMED_FROM = 5000  # episodes; with fewer no proposal on known functions was wor
 PILOT_SHARE = 0.08
 FREQUENT = 3  # failures among the first pilots: Monte Carlo does as well
 FEWEST, WORTH = 2.5, 4.0  # effective failures of the last pilot, and its gain over Monte Carlo
+
+
+def automatic(dimension: int, goal: Goal, rng: np.random.Generator) -> Estimator:
+    """Monte Carlo for few episodes; for more of them pilots choose."""
+    if goal.episodes < AIMED_FROM:
+        return MonteCarlo(dimension, goal, rng)
+    return Automatic(dimension, goal, rng)
 
 
 @dataclass
@@ -42,8 +49,6 @@ class Automatic:
         self._generations, self._spent = 0, 0
         self._weighted: WeightedEstimation | None = None
         self._plain: MonteCarlo | None = None
-        if self.goal.episodes < AIMED_FROM:
-            self._go_plain(0)
 
     def ask(self) -> Floats:
         if self._plain is not None:
@@ -68,8 +73,6 @@ class Automatic:
         return self._weighted.of(happened)
 
     def gain(self) -> tuple[float, float, float]:
-        if self._plain is not None and not self._spent:
-            return self._plain.gain()
         if self._plain is not None:
             share = self._plain.played / (self._plain.played + self._spent)
             return share, share, share

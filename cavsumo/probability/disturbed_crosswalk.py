@@ -14,7 +14,7 @@ from cavsumo.model.crosswalk import CrosswalkStart
 from cavsumo.probability.noisy import FAILED, RUNNING
 from cavsumo.probability.tree import Floats
 
-PLACE, WALK, CAR, SEEN = slice(0, 2), slice(2, 4), slice(4, 7), slice(7, 11)
+PLACE, WALK, CAR = slice(0, 2), slice(2, 4), slice(4, 7)
 
 
 @dataclass(frozen=True)

@@ -21,7 +21,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from cavsumo.probability.noisy import FAILED, RUNNING, NoisyProcess, Visited
+from cavsumo.probability.noisy import FAILED, RUNNING, NoisyProcess, Visited, exploring_spread
 from cavsumo.probability.tree import Floats
 
 FLOOR, CEILING = -20.0, -1e-3  # of log V while a run goes on
@@ -29,7 +29,6 @@ FEWEST, MOST, BRANCHES = 100, 1500, 8  # states of a fit, and how often each is 
 RIDGE, PASSES, MOST_UP = 0.001, 15, 10.0  # of the regression; the most that log V rises in a pass
 LITTLE = 0.01  # of the mean chance, below which a chance is known badly
 FARTHEST = 3.0  # standard deviations of the fitted states, beyond which a feature counts no more
-WIDEST = 2.5  # standard deviation of exploring numbers, at most
 
 
 class StepFit(NamedTuple):
@@ -96,7 +95,7 @@ def learned_chances(
 
 def explored_states(process: NoisyProcess, count: int, rng: np.random.Generator) -> Visited:
     """The states of runs whose numbers are spread wider, each run's by a factor of its own."""
-    spread = rng.uniform(1.0, WIDEST, count)
+    spread = exploring_spread(count, rng)
     states, visited = process.begin(count), Visited()
     for _ in range(process.horizon):
         go = np.flatnonzero(states[:, -1] == RUNNING)

@@ -7,7 +7,7 @@ from collections.abc import Callable, Mapping, Sequence
 import numpy as np
 
 from cavsumo.errors import InputError
-from cavsumo.probability.automatic import Automatic
+from cavsumo.probability.automatic import automatic
 from cavsumo.probability.importance import ImportanceSampling
 from cavsumo.probability.monte_carlo import MonteCarlo
 from cavsumo.probability.protocol import FEWEST_EPISODES, Estimator, Goal
@@ -15,7 +15,7 @@ from cavsumo.probability.stratified import Cut, Stratified
 
 PLAIN, STRATIFIED = "monte-carlo", "stratified"
 ESTIMATORS: Mapping[str, Callable[[int, Goal, np.random.Generator], Estimator]] = {
-    "auto": Automatic,
+    "auto": automatic,
     PLAIN: MonteCarlo,
     STRATIFIED: Stratified,
     "importance": ImportanceSampling,

@@ -16,6 +16,7 @@ from cavsumo.probability.weights import Estimate
 
 RUNNING, FAILED, ENDED = 0.0, 1.0, 2.0  # the last column of a state
 AT_ONCE = 20_000  # runs, so that the memory is bounded
+WIDEST = 2.5  # standard deviation of the numbers of exploring runs, at most
 
 Visited = list[Floats]  # the running states of runs at each step
 
@@ -56,6 +57,11 @@ class ChanceRuns(NamedTuple):
     runs: int
     failures: int
     steps: int
+
+
+def exploring_spread(count: int, rng: np.random.Generator) -> Floats:
+    """The standard deviation of the numbers of each of so many exploring runs."""
+    return rng.uniform(1.0, WIDEST, count)
 
 
 def counted(process: NoisyProcess, count: int, rng: np.random.Generator) -> ChanceRuns:

@@ -19,7 +19,13 @@ from typing import NamedTuple
 
 import numpy as np
 
-from cavsumo.probability.noisy import FAILED, RUNNING, NoisyProcess, SteppedEstimate
+from cavsumo.probability.noisy import (
+    FAILED,
+    RUNNING,
+    NoisyProcess,
+    SteppedEstimate,
+    exploring_spread,
+)
 from cavsumo.probability.shifts import (
     IN_SQUARES,
     IN_TIME,
@@ -33,7 +39,6 @@ from cavsumo.probability.tree import Floats, Ints
 from cavsumo.probability.weights import LEVEL, contradicts, weighted
 
 EXPLORED, LEARNED, RUNS = 4000, (2000,) * 2 + (4000,) * 6, 40_000  # of generations, the estimate
-SPREAD = 2.5  # standard deviation of exploration, at most
 POOLED = 4  # generations from whose failing runs a shift is learned
 EFFECTIVE = {IN_TIME: 150.0, IN_SQUARES: 300.0}  # failing runs that levelled weights are worth
 SHARES = ((0.26, 1.0), (0.04, 0.5))  # of each shift: share and part of the mean
@@ -101,7 +106,7 @@ def learned_mixture(seen: Sequence[ShiftedRuns]) -> tuple[ShiftedPart, ...]:
 
 def explored_runs(process: NoisyProcess, count: int, rng: np.random.Generator) -> ShiftedRuns:
     """Play runs whose numbers are spread wider than by chance, each by a factor of its own."""
-    spread = 1.0 + (SPREAD - 1.0) * rng.random(count)
+    spread = exploring_spread(count, rng)
 
     def law(go: Ints, features: Floats, step: int) -> tuple[Floats, Floats]:
         drawn = spread[go, None] * rng.standard_normal((len(go), process.numbers))
