@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from collections import Counter
 from collections.abc import Sequence
+from typing import NamedTuple
 
 import numpy as np
 
@@ -27,6 +28,29 @@ SLOW = (0.4, 0.7)  # speed of a leader, with which the ego is to catch up
 BRAKING_MPS2 = 3.0  # a vehicle starts no faster than it can stop with this before it must wait
 APART_M = 3.0  # smallest gap between two bodies at the start
 ATTEMPTS = 100
+
+
+class OnApproach(NamedTuple):
+    """A vehicle on an approach, before it is placed.
+
+    Attributes:
+        along: its arc length on the path of the approach [m].
+        v: its speed on the way to the ego [m/s].
+        starts_so: whether it starts with that speed even where it could not stop.
+    """
+
+    approach: Approach
+    along: float
+    v: float
+    starts_so: bool
+
+    def start(self) -> Start:
+        """Its start; one that waits at its line starts no faster than it can stop."""
+        v = self.v
+        if math.isfinite(self.approach.wait) and not self.starts_so:
+            v = min(v, math.sqrt(2.0 * BRAKING_MPS2 * max(0.0, self.approach.wait - self.along)))
+        x, y, o = self.approach.path.at(self.along)
+        return Start(x, y, o, approach=self.approach, v=v)
 
 
 def draw_vehicles(
@@ -87,9 +111,9 @@ def _draw(
     pace = float(rng.uniform(*pace_range(approach)))
     lead = float(rng.uniform(*lead_range(approach)))
     if not anywhere:
-        return vehicle_start(approach, kind, ego.length, pace, lead, start_speed)
-    v = _speed(approach, kind, pace, start_speed)
-    return _placed(approach, float(rng.uniform(*_room(approach, kind))), v, start_speed)
+        return in_time(approach, kind, ego.length, pace, lead, start_speed).start()
+    v, along = _speed(approach, kind, pace, start_speed), rng.uniform(*_room(approach, kind))
+    return OnApproach(approach, float(along), v, start_speed is not None).start()
 
 
 def pace_range(approach: Approach) -> tuple[float, float]:
@@ -102,34 +126,21 @@ def lead_range(approach: Approach) -> tuple[float, float]:
     return EARLIER_S if math.isfinite(approach.wait) else AHEAD_S
 
 
-def vehicle_start(
+def in_time(
     approach: Approach,
     kind: Kind,
     ego_length: float,
     pace: float,
     lead: float,
     start_speed: float | None = None,
-) -> Start:
-    """The start on an approach from which a vehicle meets the ego.
+) -> OnApproach:
+    """The vehicle on an approach that meets the ego.
 
     Args:
         pace: its speed as a share of what it may drive (``pace_range``).
         lead: how much earlier than the ego it arrives, or how far ahead it drives [s].
         start_speed: in place of the pace [m/s].
     """
-    along, v = arrival(approach, kind, ego_length, pace, lead, start_speed)
-    return _placed(approach, along, v, start_speed)
-
-
-def arrival(
-    approach: Approach,
-    kind: Kind,
-    ego_length: float,
-    pace: float,
-    lead: float,
-    start_speed: float | None = None,
-) -> tuple[float, float]:
-    """Where ``vehicle_start`` starts on the approach [m], and its speed on the way [m/s]."""
     v = _speed(approach, kind, pace, start_speed)
     until = approach.ego_enter / approach.ego_speed  # when the ego is there [s]
     if math.isfinite(approach.wait):
@@ -138,7 +149,7 @@ def arrival(
         ahead = lead * approach.ego_speed
         along = approach.enter + ahead + (ego_length + kind.length) / 2 - v * until
     first, last = _room(approach, kind)
-    return max(first, min(along, last)), v
+    return OnApproach(approach, max(first, min(along, last)), v, start_speed is not None)
 
 
 def _speed(approach: Approach, kind: Kind, pace: float, start_speed: float | None) -> float:
@@ -152,11 +163,3 @@ def _speed(approach: Approach, kind: Kind, pace: float, start_speed: float | Non
 def _room(approach: Approach, kind: Kind) -> tuple[float, float]:
     """The interval of arc lengths in which a vehicle may start [m]."""
     return kind.length / 2, min(approach.wait, approach.path.length - kind.length / 2)
-
-
-def _placed(approach: Approach, along: float, v: float, start_speed: float | None) -> Start:
-    """A start at an arc length; a vehicle that waits there is no faster than it can stop."""
-    if math.isfinite(approach.wait) and start_speed is None:
-        v = min(v, math.sqrt(2.0 * BRAKING_MPS2 * max(0.0, approach.wait - along)))
-    x, y, o = approach.path.at(along)
-    return Start(x, y, o, approach=approach, v=v)

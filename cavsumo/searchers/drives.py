@@ -18,7 +18,7 @@ from cavsumo.model.geometry import Box, gap
 from cavsumo.model.kinematics import wrap
 from cavsumo.model.polyline import Path
 from cavsumo.network.site import Site
-from cavsumo.network.vehicle_starts import APART_M, arrival, lead_range, pace_range, vehicle_start
+from cavsumo.network.vehicle_starts import APART_M, OnApproach, in_time, lead_range, pace_range
 from cavsumo.searchers.places import (
     FROM_LEFT,
     FROM_RIGHT,
@@ -95,26 +95,22 @@ class Drives:
             if id(approach) not in known:  # hundreds of places share a few approaches
                 known[id(approach)] = _from_line(approach, drive), _until_cue(approach, drive)
             from_line, until_cue = known[id(approach)]
-            way = approach.wait - self._arrival(place, shares)
+            way = approach.wait - self._on_approach(place, shares).along
             yield way / min(self.kind.v_max, approach.speed) + from_line <= until_cue
-
-    def _arrival(self, place: Place, shares: Mapping[str, float]) -> float:
-        """Where a vehicle starts on the approach of a place [m]."""
-        approach = place.start.approach
-        assert approach is not None
-        pace = within(pace_range(approach), shares["pace"])
-        return arrival(approach, self.kind, self.ego.length, pace, place.lead, self.start_speed)[0]
 
     def realised(self, place: Place, shares: Mapping[str, float]) -> tuple[Place, DriveProgramme]:
         """The place with a start of its own pace, and the programme of the numbers."""
+        placed = self._on_approach(place, shares)
+        crosses = math.isfinite(placed.approach.wait)
+        programme = drive_of(shares, self.kind, crosses=crosses)
+        return place._replace(start=placed.start()), programme
+
+    def _on_approach(self, place: Place, shares: Mapping[str, float]) -> OnApproach:
+        """The vehicle of a place, with the pace of the numbers."""
         approach = place.start.approach
         assert approach is not None
         pace = within(pace_range(approach), shares["pace"])
-        start = vehicle_start(
-            approach, self.kind, self.ego.length, pace, place.lead, self.start_speed
-        )
-        crosses = math.isfinite(approach.wait)
-        return place._replace(start=start), drive_of(shares, self.kind, crosses=crosses)
+        return in_time(approach, self.kind, self.ego.length, pace, place.lead, self.start_speed)
 
     def fits(self, place: Place, others: Sequence[Place]) -> bool:
         """Whether a body can start at a place, apart from the ego and from others."""
@@ -203,7 +199,7 @@ def _places(approach: Approach, ego_path: Path, kind: Kind, ego: Box) -> Iterato
     earliest, latest = lead_range(approach)
     for i in range(LEADS):
         lead = within((earliest, MOST_LEAD_S if meets else latest), i / (LEADS - 1))
-        start = vehicle_start(approach, kind, ego.length, pace, lead)
+        start = in_time(approach, kind, ego.length, pace, lead).start()
         yield Place(start, _whence(approach, ego_path), along, lead)
 
 

@@ -19,7 +19,7 @@ from cavsumo.model.kinematics import step_floats
 from cavsumo.model.scenario import BatchPlan
 from cavsumo.model.snapshot import BodyState, Snapshot
 from cavsumo.network.site import Site
-from cavsumo.network.vehicle_starts import vehicle_start
+from cavsumo.network.vehicle_starts import in_time
 
 DT, REACTION_S = 0.1, 0.675
 LIMITS = CAR.wheelbase, CAR.v_min, CAR.v_max, DT
@@ -40,7 +40,7 @@ def driven(
     The ego dawdles about a mean speed as SUMO's does, and drives on whoever comes.
     """
     driver, body = Body("ego", EGO_KIND), Body("tester0", CAR)
-    start = vehicle_start(approach, CAR, EGO_KIND.length, 0.8, lead)
+    start = in_time(approach, CAR, EGO_KIND.length, 0.8, lead).start()
     scene = site.scene(DT, driver, (body,), (start,), 1)
     drive = ProgrammedDrive(scene, 0, programme)
     vehicle = BodyState(body, start.x, start.y, start.v or 0.0, start.o)
